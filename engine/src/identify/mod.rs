@@ -1,0 +1,1 @@
+//! Identification: from data to a model.

@@ -1,0 +1,2 @@
+//! Io.
+pub use rerun as _r;
