@@ -10,4 +10,6 @@ pub mod control;
 pub mod explain;
 pub mod identify;
 pub mod model;
+pub mod plant;
+pub mod sim;
 pub mod tune;

@@ -47,6 +47,35 @@ pub enum GainsError {
         /// Offending value.
         value: f64,
     },
+    /// A setpoint weight outside 0…2.
+    #[error("the setpoint weight {name} = {} is not usable: it must lie between 0 and 2", number(*.value))]
+    Weight {
+        /// `b` or `c`.
+        name: &'static str,
+        /// Offending value.
+        value: f64,
+    },
+    /// A PV filter that is negative, longer than an hour or not finite.
+    #[error("a PV filter of {} s is not usable: it must lie between 0 and 3600 s", number(*.value))]
+    Filter {
+        /// Offending value in seconds.
+        value: f64,
+    },
+}
+
+impl GainsError {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        vec![
+            Self::Kc { value: 0.0 },
+            Self::Ti { value: -1.0 },
+            Self::Td { value: -1.0 },
+            Self::N { value: 0.0 },
+            Self::Weight { name: "b", value: 3.0 },
+            Self::Filter { value: -1.0 },
+        ]
+    }
 }
 
 impl Explain for GainsError {
@@ -56,13 +85,20 @@ impl Explain for GainsError {
             Self::Ti { .. } => "gains.ti",
             Self::Td { .. } => "gains.td",
             Self::N { .. } => "gains.n",
+            Self::Weight { .. } => "gains.weight",
+            Self::Filter { .. } => "gains.filter",
         }
     }
 
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
-            Self::Kc { value } | Self::Ti { value } | Self::Td { value } | Self::N { value } => {
-                vec![("value", number(*value))]
+            Self::Kc { value }
+            | Self::Ti { value }
+            | Self::Td { value }
+            | Self::N { value }
+            | Self::Filter { value } => vec![("value", number(*value))],
+            Self::Weight { name, value } => {
+                vec![("name", (*name).to_owned()), ("value", number(*value))]
             }
         }
     }

@@ -124,6 +124,20 @@ impl Explain for ModelError {
     }
 }
 
+impl ModelError {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        vec![
+            Self::Gain { symbol: "K", value: 0.0 },
+            Self::TimeConstant { symbol: "T", value: -3.0 },
+            Self::DeadTime { value: -1.0 },
+            Self::Polynomial { part: "numerator" },
+            Self::Improper { zeros: 2, poles: 1 },
+        ]
+    }
+}
+
 fn check_gain(symbol: &'static str, value: f64) -> Result<(), ModelError> {
     if value.is_finite() && value != 0.0 { Ok(()) } else { Err(ModelError::Gain { symbol, value }) }
 }

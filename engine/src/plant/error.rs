@@ -1,0 +1,155 @@
+//! What can be wrong with a rig, and with a value sent to it.
+
+use crate::explain::{Explain, number};
+
+/// Why a rig description or a value for the rig is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RigError {
+    /// A file of a format this version does not read.
+    #[error("this rig file has schema {found}; this version reads schema {known}")]
+    Schema {
+        /// Schema of the file.
+        found: u32,
+        /// Schema this version reads.
+        known: u32,
+    },
+    /// A rig without a tank.
+    #[error("the rig has no tank: add at least one [[tank]]")]
+    NoTank,
+    /// The same tag twice.
+    #[error("the tag {id} is used twice: every tank, pump, valve, sensor and signal needs a name of its own")]
+    Duplicate {
+        /// Tag.
+        id: String,
+    },
+    /// A tag that names nothing.
+    #[error("{item} refers to {reference}, which is not among the rig's tags")]
+    Unknown {
+        /// Who refers.
+        item: String,
+        /// Missing tag.
+        reference: String,
+    },
+    /// A number outside what its field can take.
+    #[error("{item}: {field} = {} is not possible; it must be {expected}", number(*.value))]
+    Value {
+        /// Tag of the item.
+        item: String,
+        /// Field with its unit.
+        field: &'static str,
+        /// Offending value.
+        value: f64,
+        /// What is expected, for example `> 0`.
+        expected: String,
+    },
+    /// A pump curve that is not a function.
+    #[error("the curve of pump {item} needs at least two points with increasing input and flows of 0 or more")]
+    Curve {
+        /// Tag of the pump.
+        item: String,
+    },
+    /// A valve or pump from a tank to itself.
+    #[error("{item} leads from {tank} back to {tank}")]
+    Loop {
+        /// Tag of the valve or pump.
+        item: String,
+        /// Tank at both ends.
+        tank: String,
+    },
+    /// Two loops write the same pump.
+    #[error("the loops {first} and {second} both write the pump {pump}")]
+    SharedPump {
+        /// One loop.
+        first: String,
+        /// The other.
+        second: String,
+        /// Pump both write.
+        pump: String,
+    },
+    /// Water that does not fit.
+    #[error("the reservoir {tank} would start at {} cm: the tanks hold more than water_cm3 or less than the rim allows", number(*.level_cm))]
+    Water {
+        /// Reservoir.
+        tank: String,
+        /// Level it would start at, in cm.
+        level_cm: f64,
+    },
+    /// A level no input can hold.
+    #[error("{tank} cannot be held at {} cm: with these valves the pump holds between {} and {} cm", number(*.wanted_cm), number(*.lowest_cm), number(*.highest_cm))]
+    Unreachable {
+        /// Tank.
+        tank: String,
+        /// Wanted level in cm.
+        wanted_cm: f64,
+        /// Lowest level the input range can hold, in cm.
+        lowest_cm: f64,
+        /// Highest level the input range can hold, in cm.
+        highest_cm: f64,
+    },
+}
+
+impl Explain for RigError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Schema { .. } => "rig.schema",
+            Self::NoTank => "rig.no_tank",
+            Self::Duplicate { .. } => "rig.duplicate",
+            Self::Unknown { .. } => "rig.unknown",
+            Self::Value { .. } => "rig.value",
+            Self::Curve { .. } => "rig.curve",
+            Self::Loop { .. } => "rig.loop",
+            Self::SharedPump { .. } => "rig.shared_pump",
+            Self::Water { .. } => "rig.water",
+            Self::Unreachable { .. } => "rig.unreachable",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Schema { found, known } => vec![("found", found.to_string()), ("known", known.to_string())],
+            Self::NoTank => vec![],
+            Self::Duplicate { id } => vec![("id", id.clone())],
+            Self::Unknown { item, reference } => {
+                vec![("item", item.clone()), ("reference", reference.clone())]
+            }
+            Self::Value { item, field, value, expected } => vec![
+                ("item", item.clone()),
+                ("field", (*field).to_owned()),
+                ("value", number(*value)),
+                ("expected", expected.clone()),
+            ],
+            Self::Curve { item } => vec![("item", item.clone())],
+            Self::Loop { item, tank } => vec![("item", item.clone()), ("tank", tank.clone())],
+            Self::SharedPump { first, second, pump } => {
+                vec![("first", first.clone()), ("second", second.clone()), ("pump", pump.clone())]
+            }
+            Self::Water { tank, level_cm } => vec![("tank", tank.clone()), ("level_cm", number(*level_cm))],
+            Self::Unreachable { tank, wanted_cm, lowest_cm, highest_cm } => vec![
+                ("tank", tank.clone()),
+                ("wanted_cm", number(*wanted_cm)),
+                ("lowest_cm", number(*lowest_cm)),
+                ("highest_cm", number(*highest_cm)),
+            ],
+        }
+    }
+}
+
+impl RigError {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        let text = |t: &str| t.to_owned();
+        vec![
+            Self::Schema { found: 7, known: 1 },
+            Self::NoTank,
+            Self::Duplicate { id: text("TQ1") },
+            Self::Unknown { item: text("FV01"), reference: text("TQ9") },
+            Self::Value { item: text("TQ1"), field: "area_cm2", value: -1.0, expected: text("> 0") },
+            Self::Curve { item: text("BA01") },
+            Self::Loop { item: text("FV01"), tank: text("TQ1") },
+            Self::SharedPump { first: text("LIC-01"), second: text("LIC-02"), pump: text("BA01") },
+            Self::Water { tank: text("TQ4"), level_cm: -3.5 },
+            Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },
+        ]
+    }
+}

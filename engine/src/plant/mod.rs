@@ -1,0 +1,22 @@
+//! The plant: one general network of tanks, pumps, valves and sensors, described by a file.
+//!
+//! For every tank `A dh/dt = Σ inflows − Σ outflows − spill`, solved in flux form: the integrator sums the
+//! volume of every stream over a step and moves exactly that volume, so that water is conserved to
+//! rounding. Units: cm, s, cm², cm³/s. Inputs that are not finite are refused before they reach a state.
+
+mod error;
+mod flow_law;
+mod network;
+mod pipe;
+mod sensor;
+pub mod spec;
+mod state;
+mod steady;
+
+pub use error::RigError;
+pub use flow_law::{regularised_root, regularised_root_slope};
+pub use network::{Network, Pump, RIG_SCHEMA, Sensor, Tank, Valve};
+pub use sensor::{Measurement, Reading, ReadingStatus, Transmitter};
+pub use spec::{InputUnit, RigSpec, Text};
+pub use state::{Balance, Plant};
+pub use steady::{SteadyState, steady_at_level, steady_levels};

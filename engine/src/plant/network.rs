@@ -1,0 +1,334 @@
+//! The checked tank network: indices instead of names, every number in its range.
+
+use std::collections::HashSet;
+
+use super::error::RigError;
+use super::spec::{ConfigurationSpec, InputUnit, RigSpec, SensorSpec, ValveDrive, ValveLaw};
+
+/// The schema of rig files this version reads.
+pub const RIG_SCHEMA: u32 = 1;
+
+/// One tank of the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tank {
+    /// Cross-section in cm².
+    pub area_cm2: f64,
+    /// Rim in cm.
+    pub height_cm: f64,
+    /// Tank that takes the spill; `None`: the outside.
+    pub spills_to: Option<usize>,
+}
+
+/// One pump of the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pump {
+    /// Tank it draws from; `None`: an endless supply.
+    pub from: Option<usize>,
+    /// Tank it feeds.
+    pub to: usize,
+    /// Unit of the input.
+    pub unit: InputUnit,
+    /// Lowest input.
+    pub min: f64,
+    /// Highest input.
+    pub max: f64,
+    /// Largest change of the input per second; ∞ for none.
+    pub rate_limit_per_s: f64,
+    curve: Vec<[f64; 2]>,
+}
+
+impl Pump {
+    /// Flow in cm³/s for an input: linear between the curve's points, constant outside.
+    #[must_use]
+    pub fn flow_cm3_s(&self, input: f64) -> f64 {
+        let after = self.curve.partition_point(|p| p[0] <= input);
+        if after == 0 {
+            return self.curve[0][1];
+        }
+        let [x0, q0] = self.curve[after - 1];
+        let Some(&[x1, q1]) = self.curve.get(after) else { return q0 };
+        q0 + (q1 - q0) * (input - x0) / (x1 - x0)
+    }
+}
+
+/// One valve of the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Valve {
+    /// Tank it drains.
+    pub from: usize,
+    /// Tank it feeds; `None`: the outside.
+    pub to: Option<usize>,
+    /// What drives the flow.
+    pub drive: ValveDrive,
+    /// How the flow grows with the head.
+    pub law: ValveLaw,
+    /// k at 90° in cm^2.5/s or cm²/s.
+    pub k90: f64,
+    /// Exponent n of sinⁿ α.
+    pub exponent: f64,
+}
+
+impl Valve {
+    /// `k(α) = k90 sinⁿ α` for an angle in degrees; 0 at 0°.
+    #[must_use]
+    pub fn coefficient(&self, angle_deg: f64) -> f64 {
+        if angle_deg <= 0.0 { 0.0 } else { self.k90 * angle_deg.to_radians().sin().powf(self.exponent) }
+    }
+
+    /// The head in cm that drives the flow.
+    #[must_use]
+    #[inline]
+    pub fn head_cm(&self, levels_cm: &[f64]) -> f64 {
+        let from = levels_cm[self.from];
+        match (self.drive, self.to) {
+            (ValveDrive::Between, Some(to)) => from - levels_cm[to],
+            _ => from.max(0.0),
+        }
+    }
+}
+
+/// One sensor of the network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Tank it measures.
+    pub tank: usize,
+    /// Its data.
+    pub spec: SensorSpec,
+}
+
+/// The structure of a rig, checked; it does not change while the rig runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    /// The description it was made from.
+    pub spec: RigSpec,
+    /// δ in cm.
+    pub delta_cm: f64,
+    /// Tanks in the order of the file.
+    pub tanks: Vec<Tank>,
+    /// Pumps in the order of the file.
+    pub pumps: Vec<Pump>,
+    /// Valves in the order of the file.
+    pub valves: Vec<Valve>,
+    /// Sensors in the order of the file.
+    pub sensors: Vec<Sensor>,
+    /// Tank that a bump exchanges water with; `None`: the outside.
+    pub reservoir: Option<usize>,
+}
+
+fn value(item: &str, field: &'static str, value: f64, ok: bool, expected: impl Into<String>) -> Result<(), RigError> {
+    if value.is_finite() && ok {
+        Ok(())
+    } else {
+        Err(RigError::Value { item: item.to_owned(), field, value, expected: expected.into() })
+    }
+}
+
+impl Network {
+    /// Checks a description.
+    ///
+    /// # Errors
+    /// [`RigError`] with the tag, the field and the offending value.
+    pub fn new(spec: RigSpec) -> Result<Self, RigError> {
+        if spec.schema != RIG_SCHEMA {
+            return Err(RigError::Schema { found: spec.schema, known: RIG_SCHEMA });
+        }
+        if spec.tanks.is_empty() {
+            return Err(RigError::NoTank);
+        }
+        check_names(&spec)?;
+        value(&spec.id, "delta_cm", spec.delta_cm, spec.delta_cm >= 0.0, "≥ 0")?;
+        value(&spec.id, "sample_time_s", spec.sample_time_s, spec.sample_time_s > 0.0, "> 0")?;
+        if let Some(c) = &spec.converters {
+            value(&spec.id, "shunt_ohm", c.shunt_ohm, c.shunt_ohm > 0.0, "> 0")?;
+            value(&spec.id, "adc_full_scale_v", c.adc_full_scale_v, c.adc_full_scale_v > 0.0, "> 0")?;
+            value(&spec.id, "dac_full_scale_v", c.dac_full_scale_v, c.dac_full_scale_v > 0.0, "> 0")?;
+            value(&spec.id, "adc_bits", f64::from(c.adc_bits), (1..=32).contains(&c.adc_bits), "1…32")?;
+            value(&spec.id, "dac_bits", f64::from(c.dac_bits), (1..=32).contains(&c.dac_bits), "1…32")?;
+        }
+        let network = Self {
+            delta_cm: spec.delta_cm,
+            tanks: tanks(&spec)?,
+            pumps: pumps(&spec)?,
+            valves: valves(&spec)?,
+            sensors: sensors(&spec)?,
+            reservoir: spec.reservoir.as_deref().map(|r| tank_index(&spec, &spec.id, r)).transpose()?,
+            spec,
+        };
+        for configuration in &network.spec.configurations {
+            network.check_configuration(configuration)?;
+        }
+        if let Some(water) = network.spec.water_cm3 {
+            value(&network.spec.id, "water_cm3", water, water > 0.0, "> 0")?;
+        }
+        Ok(network)
+    }
+
+    /// Index of a tank by tag.
+    #[must_use]
+    pub fn tank(&self, id: &str) -> Option<usize> {
+        self.spec.tanks.iter().position(|t| t.id == id)
+    }
+
+    /// Index of a pump by tag.
+    #[must_use]
+    pub fn pump(&self, id: &str) -> Option<usize> {
+        self.spec.pumps.iter().position(|p| p.id == id)
+    }
+
+    /// Index of a valve by tag.
+    #[must_use]
+    pub fn valve(&self, id: &str) -> Option<usize> {
+        self.spec.valves.iter().position(|v| v.id == id)
+    }
+
+    /// Index of a sensor by tag.
+    #[must_use]
+    pub fn sensor(&self, id: &str) -> Option<usize> {
+        self.spec.sensors.iter().position(|s| s.id == id)
+    }
+
+    fn check_configuration(&self, configuration: &ConfigurationSpec) -> Result<(), RigError> {
+        let unknown = |reference: &str| RigError::Unknown {
+            item: configuration.id.clone(),
+            reference: reference.to_owned(),
+        };
+        for (id, &angle) in &configuration.angles_deg {
+            self.valve(id).ok_or_else(|| unknown(id))?;
+            value(id, "angle_deg", angle, (0.0..=90.0).contains(&angle), "0…90")?;
+        }
+        for (id, &delay) in &configuration.delays_s {
+            self.pump(id).ok_or_else(|| unknown(id))?;
+            value(id, "delay_s", delay, (0.0..=3600.0).contains(&delay), "0…3600")?;
+        }
+        for (i, spec) in configuration.loops.iter().enumerate() {
+            let sensor = self.sensor(&spec.sensor).ok_or_else(|| unknown(&spec.sensor))?;
+            let pump = self.pump(&spec.pump).ok_or_else(|| unknown(&spec.pump))?;
+            let rim = self.tanks[self.sensors[sensor].tank].height_cm;
+            let on_scale = (0.0..=rim).contains(&spec.setpoint_cm);
+            value(&spec.id, "setpoint_cm", spec.setpoint_cm, on_scale, format!("0…{rim} (rim)"))?;
+            spec.check()?;
+            if let Some(other) = configuration.loops[..i].iter().find(|o| o.pump == spec.pump) {
+                return Err(RigError::SharedPump {
+                    first: other.id.clone(),
+                    second: spec.id.clone(),
+                    pump: self.spec.pumps[pump].id.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_names(spec: &RigSpec) -> Result<(), RigError> {
+    let mut tags = HashSet::new();
+    let mut signals = HashSet::new();
+    let ids = (spec.tanks.iter().map(|t| &t.id))
+        .chain(spec.pumps.iter().map(|p| &p.id))
+        .chain(spec.valves.iter().map(|v| &v.id))
+        .chain(spec.sensors.iter().map(|s| &s.id));
+    let names = (spec.tanks.iter().map(|t| &t.signal))
+        .chain(spec.pumps.iter().flat_map(|p| [&p.signal, &p.flow_signal]))
+        .chain(spec.valves.iter().map(|v| &v.signal));
+    for id in ids {
+        if !tags.insert(id) {
+            return Err(RigError::Duplicate { id: id.clone() });
+        }
+    }
+    for name in names {
+        if !signals.insert(name) {
+            return Err(RigError::Duplicate { id: name.clone() });
+        }
+    }
+    Ok(())
+}
+
+fn tank_index(spec: &RigSpec, item: &str, id: &str) -> Result<usize, RigError> {
+    spec.tanks
+        .iter()
+        .position(|t| t.id == id)
+        .ok_or_else(|| RigError::Unknown { item: item.to_owned(), reference: id.to_owned() })
+}
+
+fn tanks(spec: &RigSpec) -> Result<Vec<Tank>, RigError> {
+    spec.tanks
+        .iter()
+        .map(|t| {
+            value(&t.id, "area_cm2", t.area_cm2, t.area_cm2 > 0.0, "> 0")?;
+            value(&t.id, "height_cm", t.height_cm, t.height_cm > 0.0, "> 0")?;
+            let in_tank = (0.0..=t.height_cm).contains(&t.initial_cm);
+            value(&t.id, "initial_cm", t.initial_cm, in_tank, format!("0…{} (rim)", t.height_cm))?;
+            let spills_to = t.spills_to.as_deref().map(|o| tank_index(spec, &t.id, o)).transpose()?;
+            if spills_to.is_some_and(|o| spec.tanks[o].id == t.id) {
+                return Err(RigError::Loop { item: t.id.clone(), tank: t.id.clone() });
+            }
+            Ok(Tank { area_cm2: t.area_cm2, height_cm: t.height_cm, spills_to })
+        })
+        .collect()
+}
+
+fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
+    spec.pumps
+        .iter()
+        .map(|p| {
+            let from = p.from.as_deref().map(|f| tank_index(spec, &p.id, f)).transpose()?;
+            let to = tank_index(spec, &p.id, &p.to)?;
+            if from == Some(to) {
+                return Err(RigError::Loop { item: p.id.clone(), tank: p.to.clone() });
+            }
+            value(&p.id, "max", p.max, p.max > p.min && p.min.is_finite(), format!("> min = {}", p.min))?;
+            let in_range = (p.min..=p.max).contains(&p.initial);
+            value(&p.id, "initial", p.initial, in_range, format!("{}…{}", p.min, p.max))?;
+            value(&p.id, "delay_s", p.delay_s, (0.0..=3600.0).contains(&p.delay_s), "0…3600")?;
+            let rate = p.rate_limit.unwrap_or(f64::MAX);
+            value(&p.id, "rate_limit", rate, rate > 0.0, "> 0")?;
+            let increasing = p.curve.len() >= 2 && p.curve.windows(2).all(|w| w[1][0] > w[0][0]);
+            if !increasing || p.curve.iter().any(|q| !q[0].is_finite() || !q[1].is_finite() || q[1] < 0.0) {
+                return Err(RigError::Curve { item: p.id.clone() });
+            }
+            Ok(Pump {
+                from,
+                to,
+                unit: p.unit,
+                min: p.min,
+                max: p.max,
+                rate_limit_per_s: p.rate_limit.unwrap_or(f64::INFINITY),
+                curve: p.curve.clone(),
+            })
+        })
+        .collect()
+}
+
+fn valves(spec: &RigSpec) -> Result<Vec<Valve>, RigError> {
+    spec.valves
+        .iter()
+        .map(|v| {
+            let from = tank_index(spec, &v.id, &v.from)?;
+            let to = v.to.as_deref().map(|t| tank_index(spec, &v.id, t)).transpose()?;
+            if to == Some(from) {
+                return Err(RigError::Loop { item: v.id.clone(), tank: v.from.clone() });
+            }
+            if v.drive == ValveDrive::Between && to.is_none() {
+                return Err(RigError::Unknown { item: v.id.clone(), reference: "to".to_owned() });
+            }
+            value(&v.id, "k90", v.k90, v.k90 >= 0.0, "≥ 0")?;
+            value(&v.id, "exponent", v.exponent, v.exponent > 0.0, "> 0")?;
+            value(&v.id, "angle_deg", v.angle_deg, (0.0..=90.0).contains(&v.angle_deg), "0…90")?;
+            Ok(Valve { from, to, drive: v.drive, law: v.law, k90: v.k90, exponent: v.exponent })
+        })
+        .collect()
+}
+
+fn sensors(spec: &RigSpec) -> Result<Vec<Sensor>, RigError> {
+    spec.sensors
+        .iter()
+        .map(|s| {
+            let tank = tank_index(spec, &s.id, &s.tank)?;
+            value(&s.id, "noise_cm", s.noise_cm, s.noise_cm >= 0.0, "≥ 0")?;
+            value(&s.id, "resolution_cm", s.resolution_cm, s.resolution_cm >= 0.0, "≥ 0")?;
+            if let Some([low, high]) = s.range_cm {
+                value(&s.id, "range_cm", high, low.is_finite() && high > low, format!("> {low}"))?;
+            }
+            Ok(Sensor { tank, spec: s.clone() })
+        })
+        .collect()
+}

@@ -1,0 +1,1 @@
+//! Simulation at the sample time: the rig with its loops, and scenarios.
