@@ -7,9 +7,12 @@
 
 pub mod analyze;
 pub mod control;
+pub mod daq;
 pub mod explain;
 pub mod identify;
 pub mod model;
 pub mod plant;
+pub mod session;
+pub mod signal;
 pub mod sim;
 pub mod tune;

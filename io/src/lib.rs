@@ -1,2 +1,6 @@
-//! Io.
-pub use rerun as _r;
+//! Files and recordings of Vasos: rig presets and scenarios, plant logs, settings, Rerun.
+//!
+//! Everything that comes from outside passes here once and leaves as a checked type of the engine, or as
+//! an error that says what to do. The original files are never written to.
+
+pub mod rig;

@@ -1,0 +1,7 @@
+//! Access to a plant: one trait for the simulated rig, live devices and replays.
+
+mod simulated;
+mod source;
+
+pub use simulated::SimulatedRig;
+pub use source::{RigControls, Source};

@@ -1,0 +1,127 @@
+//! The simulated rig: the plant behind its sensors and converters.
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::source::{RigControls, Source};
+use crate::plant::{Measurement, Network, Plant, Reading, RigError, Transmitter};
+
+/// A plant with its transmitters, converters and a seeded source of noise.
+#[derive(Debug, Clone)]
+pub struct SimulatedRig {
+    plant: Plant,
+    transmitters: Vec<Transmitter>,
+    measurement: Measurement,
+    dac_step: Option<f64>,
+    written: Vec<f64>,
+    rng: Xoshiro256PlusPlus,
+}
+
+impl SimulatedRig {
+    /// A rig at the state of its file.
+    ///
+    /// # Errors
+    /// [`RigError`] when the water does not fit.
+    pub fn new(network: Arc<Network>, measurement: Measurement, seed: u64) -> Result<Self, RigError> {
+        let converters = network.spec.converters.as_ref();
+        let transmitters = network.sensors.iter().map(|s| Transmitter::new(&s.spec, converters)).collect();
+        let dac_step = converters.map(|c| c.dac_full_scale_v / f64::from(c.dac_bits).exp2());
+        let plant = Plant::new(network)?;
+        Ok(Self {
+            written: plant.inputs().to_vec(),
+            plant,
+            transmitters,
+            measurement,
+            dac_step,
+            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+        })
+    }
+}
+
+impl Source for SimulatedRig {
+    fn network(&self) -> &Arc<Network> {
+        self.plant.network()
+    }
+
+    fn read(&mut self, readings: &mut [Reading]) {
+        for (i, transmitter) in self.transmitters.iter().enumerate() {
+            let level_cm = self.plant.levels_cm()[self.plant.network().sensors[i].tank];
+            readings[i] = transmitter.measure(level_cm, self.measurement, &mut self.rng);
+        }
+    }
+
+    fn write(&mut self, pump: usize, mv: f64) -> Result<f64, RigError> {
+        let p = &self.plant.network().pumps[pump];
+        let most = p.rate_limit_per_s * self.plant.network().spec.sample_time_s;
+        let last = self.written[pump];
+        let limited = if mv.is_finite() { mv.clamp(last - most, last + most).clamp(p.min, p.max) } else { mv };
+        let converted = match self.dac_step {
+            Some(step) if self.measurement.quantisation => (limited / step).round() * step,
+            _ => limited,
+        };
+        self.plant.set_input(pump, converted)?;
+        self.written[pump] = limited;
+        Ok(limited)
+    }
+
+    fn advance(&mut self, duration_s: f64) {
+        self.plant.advance(duration_s);
+    }
+
+    fn accelerates(&self) -> bool {
+        true
+    }
+
+    fn rig(&mut self) -> Option<&mut dyn RigControls> {
+        Some(self)
+    }
+
+    fn plant(&self) -> Option<&Plant> {
+        Some(&self.plant)
+    }
+}
+
+impl RigControls for SimulatedRig {
+    fn set_angle(&mut self, valve: usize, angle_deg: f64) -> Result<(), RigError> {
+        self.plant.set_angle(valve, angle_deg)
+    }
+
+    fn bump(&mut self, tank: usize, delta_cm: f64) -> Result<f64, RigError> {
+        self.plant.bump(tank, delta_cm)
+    }
+
+    fn configure(&mut self, configuration: usize) -> Result<(), RigError> {
+        let network = self.plant.network().clone();
+        let Some(spec) = network.spec.configurations.get(configuration) else { return Ok(()) };
+        for (id, &angle_deg) in &spec.angles_deg {
+            if let Some(valve) = network.valve(id) {
+                self.plant.set_angle(valve, angle_deg)?;
+            }
+        }
+        for (id, &delay_s) in &spec.delays_s {
+            if let Some(pump) = network.pump(id) {
+                self.plant.set_delay(pump, delay_s);
+            }
+        }
+        Ok(())
+    }
+
+    fn set_state(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), RigError> {
+        self.written.copy_from_slice(inputs);
+        self.plant.set_state(levels_cm, inputs)
+    }
+
+    fn measurement(&self) -> Measurement {
+        self.measurement
+    }
+
+    fn set_measurement(&mut self, measurement: Measurement) {
+        self.measurement = measurement;
+    }
+
+    fn set_seed(&mut self, seed: u64) {
+        self.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    }
+}

@@ -1,0 +1,168 @@
+//! What a running rig and its session can be told.
+
+use serde::{Deserialize, Serialize};
+
+use crate::control::{GainsError, Mode, PidTuning};
+use crate::explain::{Explain, number};
+use crate::plant::{Measurement, RigError};
+
+/// A change of the rig or its loops; scenarios and sessions share it. Items are named by their tags.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RigCommand {
+    /// New setpoint of a loop in cm.
+    Setpoint {
+        /// Loop.
+        tag: String,
+        /// Setpoint in cm.
+        level_cm: f64,
+    },
+    /// Manual or automatic.
+    Mode {
+        /// Loop.
+        tag: String,
+        /// Who writes the output.
+        mode: Mode,
+    },
+    /// Input of a pump: a loop's in manual, or one without a loop.
+    Mv {
+        /// Loop or pump.
+        tag: String,
+        /// Input in the pump's unit.
+        value: f64,
+    },
+    /// New tuning of a loop.
+    Tuning {
+        /// Loop.
+        tag: String,
+        /// Gains and weights.
+        tuning: PidTuning,
+    },
+    /// New PV filter of a loop.
+    PvFilter {
+        /// Loop.
+        tag: String,
+        /// Time constant in seconds; 0 for none.
+        time_constant_s: f64,
+    },
+    /// Turns a valve.
+    Valve {
+        /// Valve.
+        tag: String,
+        /// Angle in degrees.
+        angle_deg: f64,
+    },
+    /// Adds water to a tank, or takes it out.
+    Bump {
+        /// Tank.
+        tag: String,
+        /// Change of level in cm.
+        delta_cm: f64,
+    },
+    /// Turns the rig to a configuration of its file; levels stay.
+    Configuration {
+        /// Its id.
+        id: String,
+    },
+    /// Solves for the input that holds a loop's level and puts the plant there.
+    SteadyAt {
+        /// Loop.
+        tag: String,
+        /// Level in cm.
+        level_cm: f64,
+    },
+    /// Switches noise, quantisation and resolution.
+    Measurement {
+        /// What is on.
+        measurement: Measurement,
+    },
+    /// Restarts the noise from a seed.
+    Seed {
+        /// Seed.
+        seed: u64,
+    },
+}
+
+/// Why a command was not carried out. Nothing has changed then.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CommandError {
+    /// The rig refuses.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The gains are not usable.
+    #[error(transparent)]
+    Gains(#[from] GainsError),
+    /// No such loop, pump, valve, tank or configuration now.
+    #[error("there is no {tag} in the present configuration")]
+    UnknownTag {
+        /// Tag.
+        tag: String,
+    },
+    /// A setpoint below the bottom, over the rim, or not a number.
+    #[error("{tag}: a setpoint of {} cm is not possible; the tank holds 0 to {} cm", number(*.level_cm), number(*.rim_cm))]
+    Setpoint {
+        /// Loop.
+        tag: String,
+        /// Setpoint in cm.
+        level_cm: f64,
+        /// Rim in cm.
+        rim_cm: f64,
+    },
+    /// An output sent to a loop in automatic.
+    #[error("{tag} is in automatic and writes the output itself; switch it to manual first")]
+    Automatic {
+        /// Loop.
+        tag: String,
+    },
+    /// A valve, tank or configuration of something that has none.
+    #[error("this source has no valves or tanks that can be set from here")]
+    NotARig,
+    /// A speed that is not possible.
+    #[error("a speed of {} × is not possible; choose 1 × to 1000 ×", number(*.speed))]
+    Speed {
+        /// Times real time.
+        speed: f64,
+    },
+}
+
+impl Explain for CommandError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Rig(error) => error.key(),
+            Self::Gains(error) => error.key(),
+            Self::UnknownTag { .. } => "command.unknown_tag",
+            Self::Setpoint { .. } => "command.setpoint",
+            Self::Automatic { .. } => "command.automatic",
+            Self::NotARig => "command.not_a_rig",
+            Self::Speed { .. } => "command.speed",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Rig(error) => error.args(),
+            Self::Gains(error) => error.args(),
+            Self::UnknownTag { tag } | Self::Automatic { tag } => vec![("tag", tag.clone())],
+            Self::Setpoint { tag, level_cm, rim_cm } => {
+                vec![("tag", tag.clone()), ("level_cm", number(*level_cm)), ("rim_cm", number(*rim_cm))]
+            }
+            Self::NotARig => vec![],
+            Self::Speed { speed } => vec![("speed", number(*speed))],
+        }
+    }
+}
+
+impl CommandError {
+    /// One of each kind of its own, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        let tag = || "LIC-02".to_owned();
+        vec![
+            Self::UnknownTag { tag: tag() },
+            Self::Setpoint { tag: tag(), level_cm: 31.0, rim_cm: 27.0 },
+            Self::Automatic { tag: tag() },
+            Self::NotARig,
+            Self::Speed { speed: -3.0 },
+        ]
+    }
+}

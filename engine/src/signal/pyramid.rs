@@ -1,0 +1,164 @@
+//! Min/max pyramid: draws any stretch of a long signal with as many points as there are pixels.
+
+/// Points of level k that make one of level k + 1.
+const FAN: usize = 8;
+
+/// Extremes of a stretch of samples, in the order in which they came.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Extremes {
+    min: f64,
+    max: f64,
+    min_first: bool,
+}
+
+/// A growing signal over growing time with its min/max pyramid.
+///
+/// NaN marks a sample without value; it is left out of extremes and of what is drawn.
+#[derive(Debug, Clone, Default)]
+pub struct Pyramid {
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+    levels: Vec<Vec<Extremes>>,
+}
+
+impl Pyramid {
+    /// Appends a sample; `time_s` does not decrease.
+    pub fn push(&mut self, time_s: f64, value: f64) {
+        self.time_s.push(time_s);
+        self.values.push(value);
+        let mut done = self.values.len();
+        let mut level = 0;
+        while done % FAN == 0 {
+            done /= FAN;
+            let merged = if level == 0 {
+                let start = self.values.len() - FAN;
+                merge(self.values[start..].iter().map(|&v| Extremes { min: v, max: v, min_first: true }))
+            } else {
+                let below = &self.levels[level - 1];
+                merge(below[below.len() - FAN..].iter().copied())
+            };
+            if self.levels.len() == level {
+                self.levels.push(Vec::new());
+            }
+            self.levels[level].push(merged);
+            level += 1;
+        }
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Times in seconds.
+    #[must_use]
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// Values in the channel's unit.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.time_s.clear();
+        self.values.clear();
+        self.levels.clear();
+    }
+
+    /// Index of the first sample at or after a time.
+    #[must_use]
+    pub fn index_at(&self, time_s: f64) -> usize {
+        self.time_s.partition_point(|&t| t < time_s)
+    }
+
+    /// Points (time, value) that draw the stretch `from_s…to_s` on about `pixels` columns: every sample
+    /// when they fit, else the extremes of each column, so that no peak is lost.
+    pub fn draw(&self, from_s: f64, to_s: f64, pixels: usize, out: &mut Vec<[f64; 2]>) {
+        out.clear();
+        let first = self.index_at(from_s).saturating_sub(1);
+        let last = (self.index_at(to_s) + 1).min(self.len());
+        if first >= last {
+            return;
+        }
+        let wanted = pixels.max(16);
+        let (mut size, mut level) = (1, None);
+        while (last - first) / size > 2 * wanted && self.levels.len() > level.map_or(0, |l: usize| l + 1) {
+            level = Some(level.map_or(0, |l| l + 1));
+            size *= FAN;
+        }
+        let Some(level) = level else {
+            out.extend((first..last).map(|i| [self.time_s[i], self.values[i]]).filter(|p| !p[1].is_nan()));
+            return;
+        };
+        let blocks = &self.levels[level];
+        let start = first / size;
+        let end = (last / size).min(blocks.len());
+        for block in start..end {
+            let e = blocks[block];
+            if e.min.is_nan() {
+                continue;
+            }
+            let early = self.time_s[block * size];
+            let late = self.time_s[block * size + size / 2];
+            let (a, b) = if e.min_first { (e.min, e.max) } else { (e.max, e.min) };
+            out.push([early, a]);
+            if a != b {
+                out.push([late, b]);
+            }
+        }
+        out.extend(((end * size).max(first)..last).map(|i| [self.time_s[i], self.values[i]]).filter(|p| !p[1].is_nan()));
+    }
+}
+
+fn merge(items: impl Iterator<Item = Extremes>) -> Extremes {
+    let mut all = Extremes { min: f64::NAN, max: f64::NAN, min_first: true };
+    let (mut min_at, mut max_at) = (0, 0);
+    for (i, item) in items.enumerate() {
+        let position = |first: bool| 2 * i + usize::from(!first);
+        if item.min < all.min || all.min.is_nan() {
+            all.min = item.min;
+            min_at = position(item.min_first);
+        }
+        if item.max > all.max || all.max.is_nan() {
+            all.max = item.max;
+            max_at = position(!item.min_first);
+        }
+    }
+    all.min_first = min_at <= max_at;
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_peak_is_lost_at_any_zoom() {
+        let mut p = Pyramid::default();
+        for i in 0..100_000 {
+            let value = if i == 54_321 { 9.0 } else if i == 12_345 { -9.0 } else { f64::from(i % 7) * 0.1 };
+            p.push(f64::from(i) * 0.2, value);
+        }
+        let mut out = Vec::new();
+        for pixels in [50, 300, 1000, 200_000] {
+            p.draw(0.0, 20_000.0, pixels, &mut out);
+            let (low, high) = out.iter().fold((0.0_f64, 0.0_f64), |(l, h), q| (l.min(q[1]), h.max(q[1])));
+            assert_eq!((low, high), (-9.0, 9.0), "at {pixels} pixels");
+            assert!(out.len() <= 100_000.min(34 * pixels.max(16)), "{} points for {pixels} pixels", out.len());
+            assert!(out.windows(2).all(|w| w[0][0] <= w[1][0]), "time goes forward");
+        }
+        p.draw(100.0, 110.0, 500, &mut out);
+        assert_eq!(out.len(), 52);
+    }
+}

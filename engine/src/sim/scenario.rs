@@ -1,0 +1,206 @@
+//! Prepared runs: a rig, a start, and commands at given times.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::closed_loop::ClosedLoop;
+use crate::explain::{Explain, number};
+use crate::plant::{Measurement, Network, RigError};
+use crate::session::{CommandError, RigCommand};
+use crate::signal::ChannelSet;
+
+/// How a run starts.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// Levels in cm by tank tag; those not named stay as the rig file has them.
+    #[serde(default)]
+    pub levels_cm: std::collections::BTreeMap<String, f64>,
+    /// Pump inputs by pump tag, in their own units.
+    #[serde(default)]
+    pub inputs: std::collections::BTreeMap<String, f64>,
+}
+
+/// A command at a time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScenarioEvent {
+    /// Time in seconds; the command acts from the first sample at or after it.
+    pub at_s: f64,
+    /// What happens.
+    #[serde(flatten)]
+    pub command: RigCommand,
+}
+
+/// A prepared run, without the rig it runs on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Version of the file format; 1.
+    pub schema: u32,
+    /// Preset or rig file.
+    pub rig: String,
+    /// Configuration of the rig; absent: its first.
+    pub configuration: Option<String>,
+    /// Length of the run in seconds.
+    pub duration_s: f64,
+    /// Seed of the noise.
+    #[serde(default)]
+    pub seed: u64,
+    /// Noise, quantisation and resolution.
+    #[serde(default = "Scenario::default_measurement")]
+    pub measurement: Measurement,
+    /// Every how many samples a row is kept.
+    #[serde(default = "Scenario::default_keep")]
+    pub keep_every: u32,
+    /// State at the start.
+    #[serde(default)]
+    pub start: Start,
+    /// Commands, in any order.
+    #[serde(rename = "event", default)]
+    pub events: Vec<ScenarioEvent>,
+}
+
+impl Scenario {
+    fn default_measurement() -> Measurement {
+        Measurement::DEFAULT
+    }
+
+    fn default_keep() -> u32 {
+        1
+    }
+}
+
+/// A finished run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Columns.
+    pub channels: Arc<ChannelSet>,
+    /// Time of each row in seconds.
+    pub time_s: Vec<f64>,
+    /// Rows one after the other.
+    pub values: Vec<f64>,
+    /// Steps of the integrator.
+    pub integrator_steps: u64,
+}
+
+impl Run {
+    /// One column by its name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let index = self.channels.channels.iter().position(|c| c.name == name)?;
+        Some(self.values.iter().skip(index).step_by(self.channels.len()).copied().collect())
+    }
+}
+
+/// Why a scenario cannot run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ScenarioError {
+    /// The start or an event is refused.
+    #[error("at {} s: {error}", number(*.at_s))]
+    Command {
+        /// Time of the event in seconds.
+        at_s: f64,
+        /// What was refused.
+        error: CommandError,
+    },
+    /// A length that is negative, too long or not a number.
+    #[error("a run of {} s with sample time {} s is not possible: at most 10⁸ samples", number(*.duration_s), number(*.sample_time_s))]
+    Duration {
+        /// Length in seconds.
+        duration_s: f64,
+        /// Sample time in seconds.
+        sample_time_s: f64,
+    },
+}
+
+impl Explain for ScenarioError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Command { .. } => "scenario.command",
+            Self::Duration { .. } => "scenario.duration",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Command { at_s, error } => vec![("at_s", number(*at_s)), ("error", error.to_string())],
+            Self::Duration { duration_s, sample_time_s } => {
+                vec![("duration_s", number(*duration_s)), ("sample_time_s", number(*sample_time_s))]
+            }
+        }
+    }
+}
+
+/// Runs a scenario on a rig from start to end.
+///
+/// # Errors
+/// [`ScenarioError`] naming the time of the refused command.
+pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, ScenarioError> {
+    let at = |at_s: f64| move |error: CommandError| ScenarioError::Command { at_s, error };
+    let configuration = configuration_index(&network, scenario).map_err(at(0.0))?;
+    let mut closed = ClosedLoop::simulated(network, configuration, scenario.measurement, scenario.seed)
+        .map_err(at(0.0))?;
+    set_start(&mut closed, &scenario.start).map_err(at(0.0))?;
+    let sample_time_s = closed.sample_time_s();
+    let count = (scenario.duration_s / sample_time_s + 1e-9).floor();
+    if !(0.0..=1e8).contains(&count) {
+        return Err(ScenarioError::Duration { duration_s: scenario.duration_s, sample_time_s });
+    }
+    let mut events: Vec<&ScenarioEvent> = scenario.events.iter().collect();
+    events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    let mut pending = events.into_iter().peekable();
+    let keep = u64::from(scenario.keep_every.max(1));
+    let mut time_s = Vec::new();
+    let mut values = Vec::new();
+    for sample in 0..=(count as u64) {
+        let now_s = closed.time_s();
+        while let Some(event) = pending.next_if(|e| e.at_s <= now_s + 1e-9) {
+            closed.apply(&event.command).map_err(at(event.at_s))?;
+        }
+        let row = closed.step();
+        if sample % keep == 0 {
+            time_s.push(now_s);
+            values.extend_from_slice(row);
+        }
+    }
+    let integrator_steps = closed.source().plant().map_or(0, crate::plant::Plant::steps);
+    Ok(Run { channels: closed.channels().clone(), time_s, values, integrator_steps })
+}
+
+fn configuration_index(network: &Network, scenario: &Scenario) -> Result<usize, CommandError> {
+    let Some(id) = &scenario.configuration else { return Ok(0) };
+    let found = network.spec.configurations.iter().position(|c| c.id == *id);
+    found.ok_or_else(|| CommandError::UnknownTag { tag: id.clone() })
+}
+
+fn set_start(closed: &mut ClosedLoop, start: &Start) -> Result<(), CommandError> {
+    if start.levels_cm.is_empty() && start.inputs.is_empty() {
+        return Ok(());
+    }
+    let network = closed.network().clone();
+    let (mut levels, mut inputs) = match closed.source().plant() {
+        Some(plant) => (plant.levels_cm().to_vec(), plant.inputs().to_vec()),
+        None => return Err(CommandError::NotARig),
+    };
+    let unknown = |tag: &String| CommandError::UnknownTag { tag: tag.clone() };
+    for (tag, &level_cm) in &start.levels_cm {
+        let tank = network.tank(tag).ok_or_else(|| unknown(tag))?;
+        let rim = network.tanks[tank].height_cm;
+        if !(0.0..=rim).contains(&level_cm) {
+            let expected = format!("0…{rim} (rim)");
+            return Err(RigError::Value { item: tag.clone(), field: "levels_cm", value: level_cm, expected }.into());
+        }
+        levels[tank] = level_cm;
+    }
+    for (tag, &input) in &start.inputs {
+        let pump = network.pump(tag).ok_or_else(|| unknown(tag))?;
+        let p = &network.pumps[pump];
+        if !(p.min..=p.max).contains(&input) {
+            let expected = format!("{}…{}", p.min, p.max);
+            return Err(RigError::Value { item: tag.clone(), field: "inputs", value: input, expected }.into());
+        }
+        inputs[pump] = input;
+    }
+    closed.restart_at(&levels, &inputs)
+}

@@ -1,0 +1,194 @@
+//! Rig and scenario files: TOML in, checked networks out, and the presets that ship inside the program.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use vasos_engine::explain::Explain;
+use vasos_engine::plant::{Network, RigError, RigSpec};
+use vasos_engine::sim::{Run, Scenario};
+
+/// A preset that ships with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preset {
+    /// Its id.
+    pub id: &'static str,
+    /// The file's text.
+    pub text: &'static str,
+}
+
+/// The presets, the first being the one that opens.
+pub const PRESETS: [Preset; 4] = [
+    Preset { id: "stad", text: include_str!("../../assets/rigs/stad.toml") },
+    Preset { id: "simtank1", text: include_str!("../../assets/rigs/simtank1.toml") },
+    Preset { id: "simtank2", text: include_str!("../../assets/rigs/simtank2.toml") },
+    Preset { id: "simtank3", text: include_str!("../../assets/rigs/simtank3.toml") },
+];
+
+/// Why a rig or scenario file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It cannot be read.
+    #[error("{path} cannot be read: {reason}")]
+    Read {
+        /// Path as given.
+        path: String,
+        /// The system's words.
+        reason: String,
+    },
+    /// It is not the TOML that the format asks for.
+    #[error("{name}, line {line}: {reason}")]
+    Format {
+        /// File name.
+        name: String,
+        /// Line of the error, from 1.
+        line: usize,
+        /// What was expected.
+        reason: String,
+    },
+    /// It describes a rig that cannot be.
+    #[error("{name}: {error}")]
+    Rig {
+        /// File name.
+        name: String,
+        /// What is wrong.
+        error: RigError,
+    },
+    /// It cannot be written.
+    #[error("{path} cannot be written: {reason}")]
+    Write {
+        /// Path as given.
+        path: String,
+        /// The system's words.
+        reason: String,
+    },
+}
+
+impl Explain for FileError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Read { .. } => "file.read",
+            Self::Format { .. } => "file.format",
+            Self::Rig { .. } => "file.rig",
+            Self::Write { .. } => "file.write",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Read { path, reason } | Self::Write { path, reason } => {
+                vec![("path", path.clone()), ("reason", reason.clone())]
+            }
+            Self::Format { name, line, reason } => {
+                vec![("name", name.clone()), ("line", line.to_string()), ("reason", reason.clone())]
+            }
+            Self::Rig { name, error } => vec![("name", name.clone()), ("error", error.to_string())],
+        }
+    }
+}
+
+impl FileError {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        let text = |t: &str| t.to_owned();
+        vec![
+            Self::Read { path: text("a.toml"), reason: text("not found") },
+            Self::Format { name: text("a.toml"), line: 3, reason: text("expected a number") },
+            Self::Rig { name: text("a.toml"), error: RigError::NoTank },
+            Self::Write { path: text("a.csv"), reason: text("disk full") },
+        ]
+    }
+}
+
+/// A preset by its id.
+///
+/// # Errors
+/// [`FileError::Read`] when there is none of that name.
+pub fn preset(id: &str) -> Result<Arc<Network>, FileError> {
+    let found = PRESETS.iter().find(|p| p.id == id).ok_or_else(|| FileError::Read {
+        path: id.to_owned(),
+        reason: format!("no preset of that name; there are {}", PRESETS.map(|p| p.id).join(", ")),
+    })?;
+    parse_rig(&format!("{id}.toml"), found.text)
+}
+
+/// A rig from the text of its file; `name` stands in errors.
+///
+/// # Errors
+/// [`FileError`] with the line, or with the item and value that cannot be.
+pub fn parse_rig(name: &str, text: &str) -> Result<Arc<Network>, FileError> {
+    let spec: RigSpec = parse(name, text)?;
+    let network = Network::new(spec).map_err(|error| FileError::Rig { name: name.to_owned(), error })?;
+    Ok(Arc::new(network))
+}
+
+/// A rig by preset id, or by path of a file.
+///
+/// # Errors
+/// [`FileError`].
+pub fn load_rig(id_or_path: &str) -> Result<Arc<Network>, FileError> {
+    if PRESETS.iter().any(|p| p.id == id_or_path) {
+        return preset(id_or_path);
+    }
+    let path = Path::new(id_or_path);
+    parse_rig(&file_name(path), &read_text(path)?)
+}
+
+/// A scenario file, and the rig it names (a preset, or a file beside it).
+///
+/// # Errors
+/// [`FileError`].
+pub fn load_scenario(path: &Path) -> Result<(Scenario, Arc<Network>), FileError> {
+    let name = file_name(path);
+    let scenario: Scenario = parse(&name, &read_text(path)?)?;
+    if scenario.schema != 1 {
+        let error = RigError::Schema { found: scenario.schema, known: 1 };
+        return Err(FileError::Rig { name, error });
+    }
+    let network = if PRESETS.iter().any(|p| p.id == scenario.rig) {
+        preset(&scenario.rig)?
+    } else {
+        let beside = path.parent().unwrap_or(Path::new(".")).join(&scenario.rig);
+        parse_rig(&file_name(&beside), &read_text(&beside)?)?
+    };
+    Ok((scenario, network))
+}
+
+/// Writes a run as CSV: `time_s`, then one column a channel, full precision.
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn write_run_csv(run: &Run, path: &Path) -> Result<(), FileError> {
+    let failed = |reason: String| FileError::Write { path: path.display().to_string(), reason };
+    let mut writer = csv::Writer::from_path(path).map_err(|e| failed(e.to_string()))?;
+    let names = run.channels.channels.iter().map(|c| c.name.as_str());
+    writer.write_record(std::iter::once("time_s").chain(names)).map_err(|e| failed(e.to_string()))?;
+    for (row, time_s) in run.values.chunks(run.channels.len()).zip(&run.time_s) {
+        let cell = |v: &f64| if v.is_nan() { String::new() } else { format!("{v}") };
+        // Sample times are multiples of the sample time; nine decimals hide the rounding of the product.
+        let time = format!("{}", (time_s * 1e9).round() / 1e9);
+        let cells = std::iter::once(time).chain(row.iter().map(cell));
+        writer.write_record(cells).map_err(|e| failed(e.to_string()))?;
+    }
+    writer.flush().map_err(|e| failed(e.to_string()))
+}
+
+fn parse<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, FileError> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = text.get(..start).map_or(1, |before| before.matches('\n').count() + 1);
+        FileError::Format { name: name.to_owned(), line, reason: error.message().trim().to_owned() }
+    })
+}
+
+fn read_text(path: &Path) -> Result<String, FileError> {
+    let failed = |reason: String| FileError::Read { path: path.display().to_string(), reason };
+    if path.is_dir() {
+        return Err(failed("it is a folder; choose the file inside it".to_owned()));
+    }
+    std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
