@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::OpenLoop;
-use super::grid::features;
+use super::grid::{RIPPLE_STEP_RAD, features};
 use super::stability::gain_crossings;
 
 /// A function of the loop that can be drawn.
@@ -89,15 +89,17 @@ pub fn frequency_curve(
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
     }
-    let intervals = ((high / low).log10() * COARSE_PER_DECADE).ceil().max(1.0);
-    let ratio = (high / low).powf(1.0 / intervals);
+    let ratio = 10f64.powf(1.0 / COARSE_PER_DECADE);
+    // The dead time turns L once every 2π/θ: no coarse interval may hide a turn, unless there are too many to draw.
+    let ripple = if open.dead_time_s > 0.0 { RIPPLE_STEP_RAD / open.dead_time_s } else { f64::INFINITY };
+    let step = ripple.max(2.0 * (high - low) / options.most_points.max(2) as f64);
     let mut points = Vec::with_capacity(512);
     let mut refiner = Refiner { open, function, options, points: &mut points };
     let mut omega = low;
     let mut value = function.at_omega(open, omega);
     refiner.push(omega, value);
-    for i in 1..=intervals as usize {
-        let next = if i == intervals as usize { high } else { low * ratio.powi(i as i32) };
+    while omega < high {
+        let next = (omega * ratio).min(omega + step).min(high);
         let at_next = function.at_omega(open, next);
         refiner.fill((omega, value), (next, at_next), DEEPEST);
         refiner.push(next, at_next);
@@ -127,21 +129,20 @@ impl Refiner<'_> {
         }
         let middle = (a.0 * b.0).sqrt();
         let value = self.function.at_omega(self.open, middle);
-        // Two probes off the middle, so that an S-shaped piece does not pass for a straight one.
-        let off_chord = |share: f64, v: Complex64| {
+        // A second probe off the middle, so that an S-shaped piece does not pass for a straight one.
+        let off_chord = |v: Complex64| {
             let (from, to) = (squeezed(a.1), squeezed(b.1));
-            let chord = to - from;
-            let length = chord.norm_sqr();
-            let offset = squeezed(v) - from;
-            if length == 0.0 {
-                return offset.norm();
-            }
-            let along = ((offset * chord.conj()).re / length).clamp(0.0, 1.0);
-            let skew = if depth == DEEPEST { (along - share).abs() * length.sqrt() * 0.1 } else { 0.0 };
-            (offset - chord * along).norm().max(skew)
+            let (chord, offset) = (to - from, squeezed(v) - from);
+            let length_sqr = chord.norm_sqr();
+            let along = if length_sqr > 0.0 {
+                ((offset * chord.conj()).re / length_sqr).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (offset - chord * along).norm()
         };
         let third = (a.0 * middle).sqrt();
-        let bends = off_chord(0.5, value).max(off_chord(0.25, self.function.at_omega(self.open, third)));
+        let bends = off_chord(value).max(off_chord(self.function.at_omega(self.open, third)));
         if bends.is_nan() || bends > self.options.tolerance {
             self.fill(a, (middle, value), depth - 1);
             self.push(middle, value);

@@ -60,8 +60,8 @@ fn squared_magnitude(p: &[f64], unit: f64) -> Vec<f64> {
     let mut scale = unit.powi(degree as i32);
     for (i, &c) in p.iter().enumerate() {
         let power = degree - i;
-        let sign = if power / 2 % 2 == 0 { 1.0 } else { -1.0 };
-        if power % 2 == 0 {
+        let sign = if (power / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
+        if power.is_multiple_of(2) {
             even.push(sign * c * scale)
         } else {
             odd.push(sign * c * scale)

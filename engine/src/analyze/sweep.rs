@@ -201,7 +201,11 @@ impl<'a> Sweep<'a> {
                         let triple = [p, current, next].map(|(w, e)| (w, e[k]));
                         let (centre, low) = minimum(|w| envelope(w)[k], triple[0], triple[1], triple[2]);
                         if low < best {
-                            self.scan((centre - 1.25 * period).max(start), centre + 1.25 * period, omegas);
+                            self.scan(
+                                (centre - 1.25 * period).max(0.3 * start),
+                                centre + 1.25 * period,
+                                omegas,
+                            );
                         }
                     }
                     None => {}
