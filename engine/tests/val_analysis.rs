@@ -24,7 +24,7 @@ fn random_model(rng: &mut StdRng) -> ProcessModel {
     let gain = log_uniform(rng, 0.1, 10.0) * if rng.random::<f64>() < 0.3 { -1.0 } else { 1.0 };
     let scale = log_uniform(rng, 0.1, 100.0);
     let dead_time = if rng.random::<f64>() < 0.25 { 0.0 } else { scale * log_uniform(rng, 0.02, 5.0) };
-    match rng.random_range(0..6) {
+    match rng.random_range(0..7) {
         0 => fopdt(gain, scale, dead_time),
         1 => ProcessModel::Ipdt(Ipdt::new(gain / scale, dead_time).expect("a model")),
         2 => {
@@ -45,6 +45,13 @@ fn random_model(rng: &mut StdRng) -> ProcessModel {
         4 => {
             // Open-loop unstable: K/(τs − 1), which wants a least gain.
             ProcessModel::rational(&[gain], &[scale, -1.0], 0.2 * dead_time).expect("a model")
+        }
+        5 => {
+            // Eight equal lags, (τs + 1)⁸ by its binomial coefficients.
+            let binomial = [1.0, 8.0, 28.0, 56.0, 70.0, 56.0, 28.0, 8.0, 1.0];
+            let den: Vec<f64> =
+                binomial.iter().zip((0..9).rev()).map(|(c, power)| c * scale.powi(power)).collect();
+            ProcessModel::rational(&[gain], &den, 0.2 * dead_time).expect("a model")
         }
         _ => {
             // Four equal lags: K/(τs + 1)⁴.
@@ -181,6 +188,17 @@ fn val_seed_001_tables_3_and_5_with_exact_dead_time() {
         assert!((analysis.ms.expect("Ms") - ms).abs() < 5e-5);
         assert!((analysis.ju.expect("Ju") - ju).abs() < 5e-5);
         assert!((analysis.jv.expect("Jv") - ti / kc).abs() < 1e-9 * ti);
+    }
+}
+
+/// The same with the first-order Padé the paper used, as printed: 1.05/1.17/1.07 and 1.58/3.04/1.58.
+#[test]
+fn val_seed_001_tables_3_and_5_as_printed_with_pade() {
+    let model = ProcessModel::rational(&[-0.5 * 0.6335, 0.6335], &[4.0, 8.5, 1.0], 0.0).expect("a model");
+    for (kc, ti, ms, ju) in [(0.8, 40.0, 1.05, 1.58), (2.6, 17.33, 1.17, 3.04), (1.0, 9.09, 1.07, 1.58)] {
+        let analysis = analyze(&model, &PidGains::pi(kc, ti));
+        assert!((analysis.ms.expect("Ms") - ms).abs() < 5e-3, "{analysis:?}");
+        assert!((analysis.ju.expect("Ju") - ju).abs() < 5e-3, "{analysis:?}");
     }
 }
 

@@ -29,7 +29,7 @@ pub struct Metrics {
     pub itae: f64,
     /// Largest |e| in PV units.
     pub peak_error: f64,
-    /// Mean of y over the last twentieth of the run.
+    /// Where y comes to rest: the mean over the last twentieth of the run, exact for a computed response.
     pub final_value: f64,
     /// Setpoint minus final value in PV units.
     pub steady_error: f64,
@@ -144,6 +144,18 @@ pub fn metrics(
     u: &[f64],
     excitation: Excitation,
 ) -> Result<Metrics, MetricsError> {
+    metrics_about(time_s, r, y, u, excitation, None)
+}
+
+/// [`metrics`] with the final value known; without, it is the mean of the run's last twentieth.
+pub(super) fn metrics_about(
+    time_s: &[f64],
+    r: &[f64],
+    y: &[f64],
+    u: &[f64],
+    excitation: Excitation,
+    final_value: Option<f64>,
+) -> Result<Metrics, MetricsError> {
     check(time_s, r, y, u)?;
     let last = time_s.len() - 1;
     let mut sums = [0.0; 4];
@@ -163,7 +175,7 @@ pub fn metrics(
         peak_error = current[1].max(peak_error);
         previous = current;
     }
-    let final_value = final_mean(time_s, y);
+    let final_value = final_value.unwrap_or_else(|| final_mean(time_s, y));
     let way = match excitation {
         Excitation::Setpoint => final_value - y[0],
         Excitation::Load => y.iter().fold(0.0f64, |m, v| m.max((v - final_value).abs())),

@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use num_complex::Complex64;
 
 use super::OpenLoop;
-use super::roots::{product, push_positive_roots};
+use super::roots::{at_j_omega, product, push_positive_roots};
 
 /// Distance of L(jω) from −1 under which a unit crossing counts as lying on it: the loop oscillates for ever.
 const ON_THE_CRITICAL_POINT: f64 = 1e-12;
@@ -129,8 +129,11 @@ fn winding(open: &OpenLoop, crossings: &[GainCrossing]) -> f64 {
             crossing.map_or(0.0, |c| if large { (1.0 + 1.0 / c.l).arg() } else { (1.0 + c.l).arg() })
         };
         total += remainder(to) - remainder(from);
-        let roots = if large { &open.zeros } else { &open.poles };
-        total += roots.iter().map(|r| turn(*r, start, end)).sum::<f64>();
+        total += if large {
+            turn(&open.num, &open.zeros, start, end)
+        } else {
+            turn(&open.den, &open.poles, start, end)
+        };
         if large && open.dead_time_s > 0.0 {
             total -= (end - start) * open.dead_time_s;
         }
@@ -138,14 +141,36 @@ fn winding(open: &OpenLoop, crossings: &[GainCrossing]) -> f64 {
     total
 }
 
+/// Change of arg p(jω) for ω from `start` to `end`, between which p has no root on the imaginary axis.
+///
+/// The roots, which may be inaccurate where several are equal, only count the whole turns; the rest is p itself.
+fn turn(p: &[f64], roots: &[Complex64], start: f64, end: f64) -> f64 {
+    let counted: f64 = roots.iter().map(|r| turn_about(*r, start, end)).sum();
+    let exact = argument(p, end) - argument(p, start);
+    exact + 2.0 * PI * ((counted - exact) / (2.0 * PI)).round()
+}
+
 /// Change of arg(jω − root) for ω from `start` to `end`, within ±π.
-fn turn(root: Complex64, start: f64, end: f64) -> f64 {
+fn turn_about(root: Complex64, start: f64, end: f64) -> f64 {
     let distance = root.re.abs();
-    let angle = |omega: f64| {
-        if omega.is_infinite() { FRAC_PI_2 } else { (omega - root.im).atan2(distance) }
-    };
+    let angle = |omega: f64| if omega.is_infinite() { FRAC_PI_2 } else { (omega - root.im).atan2(distance) };
     let change = angle(end) - angle(start);
     if root.re > 0.0 { -change } else { change }
+}
+
+/// arg p(jω) up to whole turns, also in the limits ω → 0 and ω → ∞.
+fn argument(p: &[f64], omega: f64) -> f64 {
+    let of_term =
+        |coefficient: f64, power: usize| power as f64 * FRAC_PI_2 + if coefficient < 0.0 { PI } else { 0.0 };
+    if omega.is_infinite() {
+        of_term(p[0], p.len() - 1)
+    } else if omega == 0.0 {
+        let power = p.iter().rev().position(|v| *v != 0.0).unwrap_or(0);
+        of_term(p[p.len() - 1 - power], power)
+    } else {
+        let (re, im) = at_j_omega(p, omega);
+        im.atan2(re)
+    }
 }
 
 /// Smallest angle between L at a unit crossing and −1, in radians, and the delay that closes it in seconds.
@@ -153,4 +178,20 @@ pub(super) fn angle_to_critical(l: Complex64) -> (f64, f64) {
     let lag = l.arg() + PI;
     let lag = if lag <= 0.0 { lag + 2.0 * PI } else { lag };
     (lag.min(2.0 * PI - lag), lag)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::PidGains;
+    use crate::model::ProcessModel;
+
+    /// Roots found one by one put one of these eight equal lags into the right half-plane.
+    #[test]
+    fn eight_equal_lags_are_not_called_unstable() {
+        let den: Vec<f64> = (0..8).fold(vec![1.0], |c, _| product(&c, &[4.33, 1.0]));
+        let model = ProcessModel::rational(&[4.7], &den, 0.0).expect("a model");
+        let open = OpenLoop::new(&model, &PidGains { n: 4.9, ..PidGains::pid(0.045, 12.4, 2.06) });
+        assert!(is_stable(&open, &gain_crossings(&open)));
+    }
 }

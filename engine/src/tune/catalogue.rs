@@ -33,13 +33,10 @@ const RELAY: &str = "Åström, Hägglund, PID Controllers: Theory, Design, and T
 const LUYBEN: &str = "Tyreus, Luyben, Tuning PI controllers for integrator/dead time processes, I&EC Research 31, 1992; PID: Luyben, I&EC Research 35, 1996";
 
 /// Direct synthesis: a tenth of the dominant time constant (seed 000).
-const DIRECT: Free =
-    Free { default: |shape, _| shape.time_constant_s() / 10.0, check: Check::ThirdOfDeadTime };
+const DIRECT: Free = Free { default: |shape, _| shape.time_constant_s() / 10.0, check: Check::Robust };
 /// Lambda: the dead time, but not under a third of the time constant.
-const LAMBDA: Free = Free {
-    default: |shape, _| shape.dead_time_s().max(shape.time_constant_s() / 3.0),
-    check: Check::ThirdOfDeadTime,
-};
+const LAMBDA: Free =
+    Free { default: |shape, _| shape.dead_time_s().max(shape.time_constant_s() / 3.0), check: Check::Robust };
 /// IMC: the least λ of Rivera et al. 1986, table 1.
 const IMC: Free = Free { default: least_lambda, check: Check::Default };
 /// SIMC: the dead time, Skogestad's recommendation for fast and robust control.

@@ -119,8 +119,8 @@ pub(super) struct Free {
 pub(super) enum Check {
     /// Any positive value.
     None,
-    /// θ/3: below it Ms of a cancelling controller passes 2 (spec tune.md: θ/τ = 0.3 at τc = τ/10).
-    ThirdOfDeadTime,
+    /// The share of the dead time under which Ms is past 2, see [`least_robust_s`].
+    Robust,
     /// The default is the least (Rivera et al. 1986).
     Default,
 }
@@ -251,13 +251,13 @@ impl Rule {
             None => return Err(RuleError::NeedsDeadTimeOrTauC { rule: self.id }),
         };
         match free.check {
-            Check::ThirdOfDeadTime if tau_c_s < theta / 3.0 => {
-                warnings.push(RuleWarning::LittleRobust { tau_c_s, least_s: theta / 3.0 });
+            Check::Robust if tau_c_s < least_robust_s(shape) => {
+                warnings.push(RuleWarning::LittleRobust { tau_c_s, least_s: least_robust_s(shape) });
             }
             Check::Default if tau_c_s < default => {
                 warnings.push(RuleWarning::LambdaTooShort { tau_c_s, least_s: default });
             }
-            Check::None | Check::ThirdOfDeadTime | Check::Default => {}
+            Check::None | Check::Robust | Check::Default => {}
         }
         Ok(Some(tau_c_s))
     }
@@ -276,6 +276,18 @@ impl Rule {
             (ISIMC_PID | SIMC, _) if settings.td_s > 0.0 => warnings.push(RuleWarning::FromSeries),
             _ => {}
         }
+    }
+}
+
+/// Least τc or λ of direct synthesis and lambda tuning that leaves a robust loop, in seconds.
+///
+/// With the lag cancelled L = e^(−θs)/((τc + θ)s): θ/3 is direct synthesis' default at θ/τ = 0.3, the limit of spec
+/// tune.md, where Ms = 2.129. Lambda tuning of an integrator has Ms = 2 at λ = 1.92 θ by our own analysis.
+fn least_robust_s(shape: &Shape) -> f64 {
+    match shape {
+        Shape::FirstOrder(m) => m.dead_time_s / 3.0,
+        Shape::SecondOrder(m) => m.dead_time_s / 3.0,
+        Shape::Integrating(m) => 1.92 * m.dead_time_s,
     }
 }
 

@@ -28,12 +28,12 @@ pub enum RuleWarning {
         /// θ/τ of the model.
         ratio: f64,
     },
-    /// A cancelling rule faster than a third of the dead time.
-    #[error("τc = {} s is under θ/3 = {} s: Ms passes 2 and the loop is little robust", number(*.tau_c_s), number(*.least_s))]
+    /// Direct synthesis or lambda tuning too fast for the dead time.
+    #[error("τc = {} s is under {} s: Ms passes 2 and the loop is little robust", number(*.tau_c_s), number(*.least_s))]
     LittleRobust {
         /// Closed-loop time constant in use, in seconds.
         tau_c_s: f64,
-        /// θ/3 in seconds.
+        /// Least robust τc in seconds.
         least_s: f64,
     },
     /// λ shorter than the authors of IMC allow.
