@@ -321,3 +321,21 @@ fn every_sentence_carries_its_numbers() {
         }
     }
 }
+
+/// A long record whose MV repeats every 8 s was fitted 680 s late: thinned out, one period looked like another.
+#[test]
+fn a_repeating_mv_does_not_alias_the_dead_time() {
+    let model = Fopdt { gain: 4.9, time_constant_s: 0.3, dead_time_s: 1.0 };
+    let time_s: Vec<f64> = (0..100_000).map(|k| 0.2 * f64::from(k)).collect();
+    let mv: Vec<f64> = (0..100_000).map(|k| if (k / 20) % 2 == 1 { 3.3 } else { 3.0 }).collect();
+    let mut rng = StdRng::seed_from_u64(3);
+    let clean = simulate_fopdt(&model, &time_s, &mv, 3.0, 4.0, None).expect("a run");
+    let noise = |y: &f64| {
+        let e: f64 = StandardNormal.sample(&mut rng);
+        y + 0.05 * e
+    };
+    let pv: Vec<f64> = clean.iter().map(noise).collect();
+    let fit = fit_fopdt(&FitProblem::new(&time_s, &pv, &mv)).expect("a fit");
+    assert!((fit.model.dead_time_s - 1.0).abs() < 0.02, "{:?}", fit.model);
+    assert!((fit.model.time_constant_s - 0.3).abs() < 0.02, "{:?}", fit.model);
+}

@@ -1,11 +1,13 @@
 //! The first-order-plus-dead-time fit by output error.
 
 use super::gram::Linear;
-use super::optimise::{Bounds, Point, refine};
+use super::judge::verdicts;
+use super::optimise::{Bounds, Point, evaluate, no_reference, refine};
 use super::problem::{FitProblem, Stretch};
+use super::profile::dead_time_interval;
 use super::response::{Dynamics, residuals};
 use super::start::starts;
-use super::statistics::{inverse, lag_one_correlation, resolution, student_95};
+use super::statistics::{inverse, student_95};
 use super::{FitError, FitVerdict};
 use crate::model::Fopdt;
 
@@ -39,7 +41,8 @@ pub struct FopdtFit {
     pub model: Fopdt,
     /// Standard errors from the Jacobian and the residual variance; ∞ where the data cannot tell.
     pub standard_error: Spread<f64>,
-    /// 95 % intervals (Student's t); those of T and L are cut at 0.
+    /// 95 % intervals (Student's t); those of T and L are cut at 0. Where the sample time exceeds the standard error of
+    /// L, that of L is by likelihood ratio and need not be even about L.
     pub interval_95: Spread<Interval>,
     /// Covariance of (K, T, L).
     pub covariance: [[f64; 3]; 3],
@@ -102,17 +105,53 @@ pub fn fit_fopdt(problem: &FitProblem) -> Result<FopdtFit, FitError> {
         mv_name: problem.options.mv_name.clone(),
     };
     let mut best = descend(&stretch, &bounds, &mut work);
-    let movement: f64 = stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum();
-    let poor = best.as_ref().is_none_or(|p| p.rss() > 0.1 * movement);
-    if poor && stretch.len() > START_ROWS {
-        // Dynamics faster than the copies show: start again from the liveliest rows at full resolution.
-        let window = liveliest(&stretch);
-        let start = descend(&window, &Bounds::of(&window), &mut Work { passes: 0, thinned: 0 });
-        let again = start.and_then(|p| refine(&stretch, p.dynamics, &bounds, PASSES, &mut work.passes));
-        best = better(best, again);
-    }
+    best = try_fast_dynamics(&stretch, best, &bounds, &mut work);
     let best = look_around(&stretch, best.ok_or_else(nothing)?, &bounds, &mut work);
-    report(&stretch, &best, &work, problem).ok_or_else(nothing)
+    let mut fit = report(&stretch, &best).ok_or_else(nothing)?;
+    let error_s = fit.standard_error.dead_time_s;
+    let t95 = student_95(stretch.len().saturating_sub(stretch.unknowns()));
+    if let Some(interval) = dead_time_interval(&stretch, &best, &bounds, error_s, t95, &mut work.passes) {
+        fit.interval_95.dead_time_s = interval;
+    }
+    fit.verdicts = verdicts(&fit, &stretch, problem);
+    (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
+    Ok(fit)
+}
+
+/// Dynamics faster than the thinned-out copies show, or an MV that repeats itself faster, can send the search astray:
+/// starts again from the liveliest rows at full resolution, and goes on from there if all rows agree.
+fn try_fast_dynamics(
+    stretch: &Stretch,
+    best: Option<Point>,
+    bounds: &Bounds,
+    work: &mut Work,
+) -> Option<Point> {
+    /// Windows as long as this many time constants tell them well.
+    const TIME_CONSTANTS: f64 = 5.0;
+    /// A start from a sample of the rows costs this much at most where it is right.
+    const WORTH_REFINING: f64 = 1.05;
+    if stretch.len() <= START_ROWS {
+        return best;
+    }
+    let window = liveliest(stretch);
+    let window_bounds = Bounds::of(&window);
+    let Some(found) = descend(&window, &window_bounds, &mut Work { passes: 0, thinned: 0 }) else {
+        return best;
+    };
+    let Some(best) = best else {
+        return refine(stretch, found.dynamics, bounds, PASSES, &mut work.passes);
+    };
+    let (a, b) = (best.dynamics, found.dynamics);
+    let alike = (a.time_constant_s / b.time_constant_s).ln().abs() < 0.5
+        && (a.dead_time_s - b.dead_time_s).abs() < a.time_constant_s.max(3.0 * stretch.sample_time_s);
+    if alike || b.time_constant_s * TIME_CONSTANTS > window.span_s() {
+        return Some(best);
+    }
+    work.passes += 1;
+    let promising =
+        evaluate(stretch, b, &no_reference(stretch)).filter(|p| p.rss() < WORTH_REFINING * best.rss());
+    let again = promising.and_then(|_| refine(stretch, b, bounds, PASSES, &mut work.passes));
+    better(Some(best), again)
 }
 
 struct Work {
@@ -199,7 +238,7 @@ fn activity(u: &[f64]) -> f64 {
     u.windows(2).map(|w| (w[1] - w[0]).abs()).sum()
 }
 
-fn report(stretch: &Stretch, best: &Point, work: &Work, problem: &FitProblem) -> Option<FopdtFit> {
+fn report(stretch: &Stretch, best: &Point) -> Option<FopdtFit> {
     let Dynamics { time_constant_s, dead_time_s } = best.dynamics;
     let linear = &best.projected.linear;
     let model = Fopdt::new(linear.gain, time_constant_s, dead_time_s).ok()?;
@@ -215,7 +254,7 @@ fn report(stretch: &Stretch, best: &Point, work: &Work, problem: &FitProblem) ->
     };
     let t95 = student_95(freedom);
     let around = |value: f64, error: f64, floor: f64| [(value - t95 * error).max(floor), value + t95 * error];
-    let mut fit = FopdtFit {
+    Some(FopdtFit {
         model,
         standard_error,
         interval_95: Spread {
@@ -234,11 +273,9 @@ fn report(stretch: &Stretch, best: &Point, work: &Work, problem: &FitProblem) ->
         segments: stretch.segments.len(),
         simulated,
         verdicts: Vec::new(),
-        passes: work.passes,
-        thinned_passes: work.thinned,
-    };
-    fit.verdicts = verdicts(&fit, stretch, problem);
-    Some(fit)
+        passes: 0,
+        thinned_passes: 0,
+    })
 }
 
 fn free_run(stretch: &Stretch, dynamics: Dynamics, linear: &Linear) -> (Vec<f64>, f64) {
@@ -261,62 +298,4 @@ fn covariance(best: &Point, variance: f64) -> [[f64; 3]; 3] {
         }
         None => [[f64::INFINITY; 3]; 3],
     }
-}
-
-fn verdicts(fit: &FopdtFit, stretch: &Stretch, problem: &FitProblem) -> Vec<FitVerdict> {
-    /// Half width of K's interval, in percent, that passes for known.
-    const GAIN_KNOWN_PERCENT: f64 = 20.0;
-    const POOR_PERCENT: f64 = 50.0;
-    const CORRELATED: f64 = 0.5;
-    let half = |i: Interval, value: f64| 100.0 * (i[1] - value) / value.abs();
-    let gain_percent = half(fit.interval_95.gain, fit.model.gain);
-    let (t, l) = (fit.model.time_constant_s, fit.model.dead_time_s);
-    let sample_time_s = stretch.sample_time_s;
-    let mut found = Vec::new();
-    if fit.fit_percent < POOR_PERCENT {
-        found.push(FitVerdict::Poor { fit_percent: fit.fit_percent });
-    }
-    if t > stretch.span_s() {
-        found.push(FitVerdict::TimeConstantLong { time_constant_s: t, span_s: stretch.span_s() });
-    } else if gain_percent > GAIN_KNOWN_PERCENT {
-        found.push(FitVerdict::GainUncertain { percent: gain_percent, times: gain_percent / 10.0 });
-    }
-    if t < sample_time_s / 3.0 {
-        found.push(FitVerdict::TimeConstantShort { time_constant_s: t, sample_time_s });
-    }
-    let [lower, upper] = fit.interval_95.dead_time_s;
-    if lower <= 0.0 && upper > sample_time_s {
-        found.push(FitVerdict::DeadTimeUnknown {
-            upper_s: upper,
-            times: ((upper - l) / l.max(sample_time_s)).max(1.0),
-        });
-    }
-    let sd = fit.mse.sqrt();
-    if let Some(step) = resolution(problem.pv)
-        && sd < 0.5 * step
-    {
-        let (low, high) =
-            fit.simulated.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        if high - low < 20.0 * step {
-            found.push(FitVerdict::ResolutionLimited { resolution: step, levels: (high - low) / step });
-        }
-    }
-    let correlation = lag_one_correlation(problem.pv.iter().zip(&fit.simulated).map(|(y, s)| y - s));
-    if correlation > CORRELATED && fit.fit_percent < 99.9 {
-        found.push(FitVerdict::ResidualsCorrelated { correlation });
-    }
-    if found.is_empty() {
-        found.push(FitVerdict::Good {
-            fit_percent: fit.fit_percent,
-            gain_percent,
-            time_constant_percent: half(fit.interval_95.time_constant_s, t),
-        });
-    }
-    if fit.segments > 1 {
-        found.push(FitVerdict::Segments { count: fit.segments });
-    }
-    if !stretch.free {
-        found.push(FitVerdict::StartsAtRest { mv_before: stretch.u_before });
-    }
-    found
 }

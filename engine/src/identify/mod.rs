@@ -11,8 +11,10 @@
 mod error;
 mod fopdt;
 mod gram;
+mod judge;
 mod optimise;
 mod problem;
+mod profile;
 mod response;
 mod simulate;
 mod start;

@@ -103,6 +103,35 @@ pub(super) fn refine(
     Some(best)
 }
 
+/// The best T for a given L, from a point nearby.
+pub(super) fn refine_time_constant(
+    stretch: &Stretch,
+    near: &Point,
+    dead_time_s: f64,
+    bounds: &Bounds,
+    evaluations: &mut usize,
+) -> Option<Point> {
+    /// Gauss–Newton in one unknown from a start this close ends in so many.
+    const PASSES: usize = 4;
+    let mut at = bounds.clip(Dynamics { dead_time_s, ..near.dynamics });
+    let mut best: Option<Point> = None;
+    for _ in 0..PASSES {
+        *evaluations += 1;
+        let point = evaluate(stretch, at, &near.projected.linear)?;
+        let reduced = reduce(&point.projected);
+        let alone = if reduced.h[0][0] > 0.0 { reduced.g[0] / reduced.h[0][0] } else { 0.0 };
+        if best.as_ref().is_none_or(|b| point.rss() < b.rss()) {
+            best = Some(point);
+        }
+        if alone.abs() < 1e-6 {
+            break;
+        }
+        at = bounds
+            .clip(Dynamics { time_constant_s: at.time_constant_s * alone.clamp(-1.0, 1.0).exp(), ..at });
+    }
+    best
+}
+
 fn moved(from: Dynamics, step: [f64; 2], bounds: &Bounds) -> Dynamics {
     let time_constant_s = from.time_constant_s * step[0].clamp(-LARGEST_STEP, LARGEST_STEP).exp();
     bounds.clip(Dynamics { time_constant_s, dead_time_s: from.dead_time_s + step[1] * from.time_constant_s })
