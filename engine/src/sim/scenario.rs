@@ -189,7 +189,9 @@ fn set_start(closed: &mut ClosedLoop, start: &Start) -> Result<(), CommandError>
         let rim = network.tanks[tank].height_cm;
         if !(0.0..=rim).contains(&level_cm) {
             let expected = format!("0…{rim} (rim)");
-            return Err(RigError::Value { item: tag.clone(), field: "levels_cm", value: level_cm, expected }.into());
+            return Err(
+                RigError::Value { item: tag.clone(), field: "levels_cm", value: level_cm, expected }.into()
+            );
         }
         levels[tank] = level_cm;
     }
