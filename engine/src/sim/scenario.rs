@@ -130,6 +130,13 @@ impl Explain for ScenarioError {
             }
         }
     }
+
+    fn cause(&self) -> Option<&dyn Explain> {
+        match self {
+            Self::Command { error, .. } => Some(error),
+            _ => None,
+        }
+    }
 }
 
 /// Runs a scenario on a rig from start to end.
