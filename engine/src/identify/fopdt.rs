@@ -1,0 +1,322 @@
+//! The first-order-plus-dead-time fit by output error.
+
+use super::gram::Linear;
+use super::optimise::{Bounds, Point, refine};
+use super::problem::{FitProblem, Stretch};
+use super::response::{Dynamics, residuals};
+use super::start::starts;
+use super::statistics::{inverse, lag_one_correlation, resolution, student_95};
+use super::{FitError, FitVerdict};
+use crate::model::Fopdt;
+
+/// Rows above which a start is sought on a thinned-out copy.
+const START_ROWS: usize = 2048;
+/// Coarsest step from one copy to the next.
+const THINNING: usize = 32;
+/// Passes a refinement may take.
+const PASSES: usize = 40;
+/// Above this many rows the cells next to the optimum are not tried.
+const NEIGHBOUR_ROWS: usize = 20_000;
+
+/// A pair of limits.
+pub type Interval = [f64; 2];
+
+/// One value for each of the model's three parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread<V> {
+    /// For K, in PV units per MV unit.
+    pub gain: V,
+    /// For T, in seconds.
+    pub time_constant_s: V,
+    /// For L, in seconds.
+    pub dead_time_s: V,
+}
+
+/// A fitted FOPDT with what is known about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FopdtFit {
+    /// K, T, L.
+    pub model: Fopdt,
+    /// Standard errors from the Jacobian and the residual variance; ∞ where the data cannot tell.
+    pub standard_error: Spread<f64>,
+    /// 95 % intervals (Student's t); those of T and L are cut at 0.
+    pub interval_95: Spread<Interval>,
+    /// Covariance of (K, T, L).
+    pub covariance: [[f64; 3]; 3],
+    /// PV that an MV of 0 settles at, in PV units.
+    pub bias: f64,
+    /// Modelled PV of the first row, in PV units.
+    pub initial_pv: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖) of the free run.
+    pub fit_percent: f64,
+    /// 1 − ‖y − ŷ‖²/‖y − ȳ‖².
+    pub r2: f64,
+    /// Mean squared residual, in PV units squared.
+    pub mse: f64,
+    /// Akaike's criterion, N ln(RSS/N) + 2 p with p unknowns.
+    pub aic: f64,
+    /// Rows fitted.
+    pub rows: usize,
+    /// Pieces between gaps.
+    pub segments: usize,
+    /// Free run ŷ, one value a row, in PV units.
+    pub simulated: Vec<f64>,
+    /// Findings, most important first; never empty.
+    pub verdicts: Vec<FitVerdict>,
+    /// Passes over all rows.
+    pub passes: usize,
+    /// Passes over thinned-out copies.
+    pub thinned_passes: usize,
+}
+
+impl FopdtFit {
+    /// The finding that comes first.
+    #[must_use]
+    pub fn verdict(&self) -> &FitVerdict {
+        &self.verdicts[0]
+    }
+
+    /// y − ŷ, in PV units.
+    #[must_use]
+    pub fn residuals(&self, pv: &[f64]) -> Vec<f64> {
+        pv.iter().zip(&self.simulated).map(|(y, simulated)| y - simulated).collect()
+    }
+}
+
+/// Fits K e^(−Ls)/(T s + 1) to a stretch by output error.
+///
+/// y(t) = bias + K x(t) + free state, T ẋ = −x + u(t − L): exact for an MV held between arbitrary stamps, L ≥ 0
+/// continuous. Minimises ‖y − ŷ‖² over K, T, L, bias and the initial state of each segment: a global start over
+/// (T, L), then Gauss–Newton with the linear unknowns projected out.
+///
+/// # Errors
+/// [`FitError`] names the column and the row of what is wrong with the data.
+///
+/// Source: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; Ljung, System Identification, 2nd ed., 7.2–7.4, 9.3.
+pub fn fit_fopdt(problem: &FitProblem) -> Result<FopdtFit, FitError> {
+    let stretch = problem.stretch()?;
+    let bounds = Bounds::of(&stretch);
+    let mut work = Work { passes: 0, thinned: 0 };
+    let nothing = || FitError::NothingToFit {
+        pv_name: problem.options.pv_name.clone(),
+        mv_name: problem.options.mv_name.clone(),
+    };
+    let mut best = descend(&stretch, &bounds, &mut work);
+    let movement: f64 = stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum();
+    let poor = best.as_ref().is_none_or(|p| p.rss() > 0.1 * movement);
+    if poor && stretch.len() > START_ROWS {
+        // Dynamics faster than the copies show: start again from the liveliest rows at full resolution.
+        let window = liveliest(&stretch);
+        let start = descend(&window, &Bounds::of(&window), &mut Work { passes: 0, thinned: 0 });
+        let again = start.and_then(|p| refine(&stretch, p.dynamics, &bounds, PASSES, &mut work.passes));
+        best = better(best, again);
+    }
+    let best = look_around(&stretch, best.ok_or_else(nothing)?, &bounds, &mut work);
+    report(&stretch, &best, &work, problem).ok_or_else(nothing)
+}
+
+struct Work {
+    passes: usize,
+    thinned: usize,
+}
+
+fn better(a: Option<Point>, b: Option<Point>) -> Option<Point> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b.rss() < a.rss() { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// From the thinnest copy to all rows.
+fn descend(stretch: &Stretch, bounds: &Bounds, work: &mut Work) -> Option<Point> {
+    let mut copies: Vec<Stretch> = Vec::new();
+    while let Some(factor) = {
+        let rows = copies.last().unwrap_or(stretch).len();
+        (rows > START_ROWS).then(|| (rows / (START_ROWS / 2)).clamp(2, THINNING))
+    } {
+        let copy = copies.last().unwrap_or(stretch).thinned(factor);
+        copies.push(copy);
+    }
+    let coarsest = copies.last().unwrap_or(stretch);
+    let mut count = 0;
+    let mut best = None;
+    for start in starts(coarsest) {
+        best = better(best, refine(coarsest, start, bounds, PASSES, &mut count));
+    }
+    let mut best = best?;
+    if copies.is_empty() {
+        work.passes += count;
+        return Some(best);
+    }
+    for copy in copies.iter().rev().skip(1) {
+        best = refine(copy, best.dynamics, bounds, PASSES, &mut count).unwrap_or(best);
+    }
+    work.thinned += count;
+    refine(stretch, best.dynamics, bounds, PASSES, &mut work.passes)
+}
+
+/// The cost has a kink wherever L passes a row: tries the neighbouring cells where the rows are far apart.
+fn look_around(stretch: &Stretch, best: Point, bounds: &Bounds, work: &mut Work) -> Point {
+    const CELL_PASSES: usize = 8;
+    let found = best.dynamics;
+    let coarse = stretch.sample_time_s > 0.02 * found.time_constant_s;
+    if !coarse || stretch.len() > NEIGHBOUR_ROWS {
+        return best;
+    }
+    let cell = (found.dead_time_s / stretch.sample_time_s).floor();
+    let mut best = best;
+    for middle in [cell - 0.5, cell + 1.5] {
+        if middle > 0.0 {
+            let start = Dynamics { dead_time_s: middle * stretch.sample_time_s, ..found };
+            if let Some(other) = refine(stretch, start, bounds, CELL_PASSES, &mut work.passes)
+                && other.rss() < best.rss()
+            {
+                best = other;
+            }
+        }
+    }
+    best
+}
+
+/// The [`START_ROWS`] neighbouring rows in which the MV varies most.
+fn liveliest<'a>(s: &Stretch<'a>) -> Stretch<'a> {
+    let first = (0..=s.len() - START_ROWS)
+        .step_by(START_ROWS / 2)
+        .max_by(|&a, &b| activity(&s.u[a..a + START_ROWS]).total_cmp(&activity(&s.u[b..b + START_ROWS])))
+        .unwrap_or(0);
+    let mut window = s.clone();
+    let rows = first..first + START_ROWS;
+    let u_before = if first > 0 { s.u[first - 1] } else { s.u_before };
+    let slice = |v: &[f64]| std::borrow::Cow::Owned(v[rows.clone()].to_vec());
+    (window.t, window.u, window.y) = (slice(&s.t), slice(&s.u), slice(&s.y));
+    window.u_before = u_before;
+    window.segments.truncate(1);
+    window.free = s.free || first > 0;
+    window
+}
+
+fn activity(u: &[f64]) -> f64 {
+    u.windows(2).map(|w| (w[1] - w[0]).abs()).sum()
+}
+
+fn report(stretch: &Stretch, best: &Point, work: &Work, problem: &FitProblem) -> Option<FopdtFit> {
+    let Dynamics { time_constant_s, dead_time_s } = best.dynamics;
+    let linear = &best.projected.linear;
+    let model = Fopdt::new(linear.gain, time_constant_s, dead_time_s).ok()?;
+    let (simulated, rss) = free_run(stretch, best.dynamics, linear);
+    let rows = stretch.len();
+    let movement: f64 = stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum();
+    let freedom = rows.saturating_sub(stretch.unknowns()).max(1);
+    let covariance = covariance(best, rss / freedom as f64);
+    let standard_error = Spread {
+        gain: covariance[0][0].sqrt(),
+        time_constant_s: covariance[1][1].sqrt(),
+        dead_time_s: covariance[2][2].sqrt(),
+    };
+    let t95 = student_95(freedom);
+    let around = |value: f64, error: f64, floor: f64| [(value - t95 * error).max(floor), value + t95 * error];
+    let mut fit = FopdtFit {
+        model,
+        standard_error,
+        interval_95: Spread {
+            gain: around(model.gain, standard_error.gain, f64::NEG_INFINITY),
+            time_constant_s: around(time_constant_s, standard_error.time_constant_s, 0.0),
+            dead_time_s: around(dead_time_s, standard_error.dead_time_s, 0.0),
+        },
+        covariance,
+        bias: stretch.y_ref + linear.bias - linear.gain * stretch.u_ref,
+        initial_pv: simulated[0],
+        fit_percent: 100.0 * (1.0 - (rss / movement).sqrt()),
+        r2: 1.0 - rss / movement,
+        mse: rss / rows as f64,
+        aic: rows as f64 * (rss / rows as f64).max(f64::MIN_POSITIVE).ln() + 2.0 * stretch.unknowns() as f64,
+        rows,
+        segments: stretch.segments.len(),
+        simulated,
+        verdicts: Vec::new(),
+        passes: work.passes,
+        thinned_passes: work.thinned,
+    };
+    fit.verdicts = verdicts(&fit, stretch, problem);
+    Some(fit)
+}
+
+fn free_run(stretch: &Stretch, dynamics: Dynamics, linear: &Linear) -> (Vec<f64>, f64) {
+    let mut simulated = Vec::with_capacity(stretch.len());
+    let mut rss = 0.0;
+    residuals(stretch, dynamics, linear, |first, r| {
+        simulated.extend(stretch.y[first..first + r.len()].iter().zip(r).map(|(y, r)| y - r));
+        rss += r.iter().map(|r| r * r).sum::<f64>();
+    });
+    (simulated, rss)
+}
+
+/// Covariance of (K, T, L) from that of (bias, K, ln T, L/T).
+fn covariance(best: &Point, variance: f64) -> [[f64; 3]; 3] {
+    let time_constant_s = best.dynamics.time_constant_s;
+    let scale = [1.0, time_constant_s, time_constant_s];
+    match inverse(&best.projected.matrix) {
+        Some(c) => {
+            std::array::from_fn(|i| std::array::from_fn(|j| variance * scale[i] * scale[j] * c[i + 1][j + 1]))
+        }
+        None => [[f64::INFINITY; 3]; 3],
+    }
+}
+
+fn verdicts(fit: &FopdtFit, stretch: &Stretch, problem: &FitProblem) -> Vec<FitVerdict> {
+    /// Half width of K's interval, in percent, that passes for known.
+    const GAIN_KNOWN_PERCENT: f64 = 20.0;
+    const POOR_PERCENT: f64 = 50.0;
+    const CORRELATED: f64 = 0.5;
+    let half = |i: Interval, value: f64| 100.0 * (i[1] - value) / value.abs();
+    let gain_percent = half(fit.interval_95.gain, fit.model.gain);
+    let (t, l) = (fit.model.time_constant_s, fit.model.dead_time_s);
+    let sample_time_s = stretch.sample_time_s;
+    let mut found = Vec::new();
+    if fit.fit_percent < POOR_PERCENT {
+        found.push(FitVerdict::Poor { fit_percent: fit.fit_percent });
+    }
+    if t > stretch.span_s() {
+        found.push(FitVerdict::TimeConstantLong { time_constant_s: t, span_s: stretch.span_s() });
+    } else if gain_percent > GAIN_KNOWN_PERCENT {
+        found.push(FitVerdict::GainUncertain { percent: gain_percent, times: gain_percent / 10.0 });
+    }
+    if t < sample_time_s / 3.0 {
+        found.push(FitVerdict::TimeConstantShort { time_constant_s: t, sample_time_s });
+    }
+    let [lower, upper] = fit.interval_95.dead_time_s;
+    if lower <= 0.0 && upper > sample_time_s {
+        found.push(FitVerdict::DeadTimeUnknown {
+            upper_s: upper,
+            times: ((upper - l) / l.max(sample_time_s)).max(1.0),
+        });
+    }
+    let sd = fit.mse.sqrt();
+    if let Some(step) = resolution(problem.pv)
+        && sd < 0.5 * step
+    {
+        let (low, high) =
+            fit.simulated.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        if high - low < 20.0 * step {
+            found.push(FitVerdict::ResolutionLimited { resolution: step, levels: (high - low) / step });
+        }
+    }
+    let correlation = lag_one_correlation(problem.pv.iter().zip(&fit.simulated).map(|(y, s)| y - s));
+    if correlation > CORRELATED && fit.fit_percent < 99.9 {
+        found.push(FitVerdict::ResidualsCorrelated { correlation });
+    }
+    if found.is_empty() {
+        found.push(FitVerdict::Good {
+            fit_percent: fit.fit_percent,
+            gain_percent,
+            time_constant_percent: half(fit.interval_95.time_constant_s, t),
+        });
+    }
+    if fit.segments > 1 {
+        found.push(FitVerdict::Segments { count: fit.segments });
+    }
+    if !stretch.free {
+        found.push(FitVerdict::StartsAtRest { mv_before: stretch.u_before });
+    }
+    found
+}

@@ -1,0 +1,272 @@
+//! What is to be fitted: a stretch of data, checked once and thinned out for the start.
+
+use std::borrow::Cow;
+
+use super::FitError;
+
+/// Fewest rows a fit accepts: the model has five unknowns.
+const MIN_ROWS: usize = 10;
+/// A gap longer than this many sample times starts a segment with a free state.
+const GAP_SAMPLES: f64 = 3.0;
+/// Stamps this close to an even grid, in sample times, are taken to lie on it.
+const UNIFORM_TOLERANCE: f64 = 1e-7;
+
+/// What is known of the state before the first row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum InitialState {
+    /// Unknown: estimated along, once for each segment.
+    #[default]
+    Free,
+    /// At rest with the MV before the first row. Taken by itself where the MV never moves after it.
+    Rest,
+}
+
+/// What the user may say about a stretch besides its columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitOptions {
+    /// MV before the first row, in MV units; absent: that of the first row.
+    pub mv_before: Option<f64>,
+    /// What is known of the state before the first row.
+    pub initial_state: InitialState,
+    /// Name of the time column, for messages.
+    pub time_name: String,
+    /// Name of the PV column, for messages.
+    pub pv_name: String,
+    /// Name of the MV column, for messages.
+    pub mv_name: String,
+    /// Number of the first row as the user counts, for messages.
+    pub first_row: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            mv_before: None,
+            initial_state: InitialState::Free,
+            time_name: "time".to_owned(),
+            pv_name: "PV".to_owned(),
+            mv_name: "MV".to_owned(),
+            first_row: 1,
+        }
+    }
+}
+
+/// A stretch of data to fit: one MV to one PV, three columns of one length N ≥ 10.
+#[derive(Debug, Clone)]
+pub struct FitProblem<'a> {
+    /// Time stamps in seconds, not decreasing; any start.
+    pub time_s: &'a [f64],
+    /// Process variable, measured just before its stamp, in PV units.
+    pub pv: &'a [f64],
+    /// Manipulated variable, applied from its stamp until the next, in MV units.
+    pub mv: &'a [f64],
+    /// What else is known.
+    pub options: FitOptions,
+}
+
+impl<'a> FitProblem<'a> {
+    /// A stretch with default options.
+    #[must_use]
+    pub fn new(time_s: &'a [f64], pv: &'a [f64], mv: &'a [f64]) -> Self {
+        Self { time_s, pv, mv, options: FitOptions::default() }
+    }
+
+    /// Checks the columns and finds the sample time and the segments.
+    pub(super) fn stretch(&self) -> Result<Stretch<'a>, FitError> {
+        self.check_columns()?;
+        let o = &self.options;
+        let names = || (o.pv_name.clone(), o.mv_name.clone());
+        if self.time_s.len() < MIN_ROWS {
+            return Err(FitError::TooFewSamples { rows: self.time_s.len(), needed: MIN_ROWS });
+        }
+        if let Some(value) = o.mv_before.filter(|v| !v.is_finite()) {
+            return Err(FitError::MvBefore { column: o.mv_name.clone(), value });
+        }
+        let mv_still = is_constant(self.mv);
+        if is_constant(self.pv) {
+            return Err(FitError::ConstantPv { column: o.pv_name.clone(), value: self.pv[0] });
+        }
+        let u_before = o.mv_before.unwrap_or(self.mv[0]);
+        if mv_still && u_before == self.mv[0] {
+            let (pv_name, mv_name) = names();
+            return Err(if o.mv_before.is_some() {
+                FitError::ConstantMv { column: mv_name, value: u_before }
+            } else {
+                FitError::NeedsMvBefore { pv_name, mv_name, value: u_before }
+            });
+        }
+        if self.pv == self.mv {
+            let (pv_name, mv_name) = names();
+            return Err(FitError::SameColumn { pv_name, mv_name });
+        }
+        let free = o.initial_state == InitialState::Free && !mv_still;
+        Ok(Stretch::new(self.time_s.into(), self.mv.into(), self.pv.into(), u_before, free))
+    }
+
+    /// Checks lengths, numbers and the order of time.
+    pub(super) fn check_columns(&self) -> Result<(), FitError> {
+        let o = &self.options;
+        let rows = self.time_s.len();
+        if self.pv.len() != rows || self.mv.len() != rows {
+            return Err(FitError::LengthMismatch {
+                time: rows,
+                pv: self.pv.len(),
+                mv: self.mv.len(),
+                pv_name: o.pv_name.clone(),
+                mv_name: o.mv_name.clone(),
+            });
+        }
+        for (column, values) in [(&o.time_name, self.time_s), (&o.pv_name, self.pv), (&o.mv_name, self.mv)] {
+            if let Some(i) = first_not_finite(values) {
+                return Err(FitError::NotFinite {
+                    column: column.clone(),
+                    row: o.first_row + i,
+                    value: values[i],
+                });
+            }
+        }
+        if let Some(i) = self.time_s.windows(2).position(|w| w[1] < w[0]) {
+            return Err(FitError::TimeBackwards {
+                column: o.time_name.clone(),
+                row: o.first_row + i + 1,
+                from_s: self.time_s[i],
+                to_s: self.time_s[i + 1],
+            });
+        }
+        if rows > 0 && self.time_s[rows - 1] <= self.time_s[0] {
+            return Err(FitError::NoTimeSpan { column: o.time_name.clone() });
+        }
+        Ok(())
+    }
+}
+
+fn is_constant(values: &[f64]) -> bool {
+    values.iter().all(|&v| v == values[0])
+}
+
+fn first_not_finite(values: &[f64]) -> Option<usize> {
+    // A sum is finite only when every term is, bar an overflow, which the search then finds harmless.
+    let clean = values.iter().map(|v| v * 0.0).sum::<f64>() == 0.0;
+    if clean { None } else { values.iter().position(|v| !v.is_finite()) }
+}
+
+/// A validated stretch, or a thinned-out copy of one.
+#[derive(Debug, Clone)]
+pub(super) struct Stretch<'a> {
+    /// Time stamps in seconds.
+    pub t: Cow<'a, [f64]>,
+    /// MV.
+    pub u: Cow<'a, [f64]>,
+    /// PV.
+    pub y: Cow<'a, [f64]>,
+    /// MV before the first row.
+    pub u_before: f64,
+    /// Value taken off the MV: its mean.
+    pub u_ref: f64,
+    /// Value taken off the PV: its mean.
+    pub y_ref: f64,
+    /// Typical time between rows, in seconds; > 0.
+    pub sample_time_s: f64,
+    /// Whether all rows lie on an even grid of that sample time.
+    pub uniform: bool,
+    /// First row of each segment; the first is 0.
+    pub segments: Vec<usize>,
+    /// Whether the initial state of each segment is estimated.
+    pub free: bool,
+}
+
+impl<'a> Stretch<'a> {
+    pub fn new(t: Cow<'a, [f64]>, u: Cow<'a, [f64]>, y: Cow<'a, [f64]>, u_before: f64, free: bool) -> Self {
+        let rows = t.len();
+        let even = (t[rows - 1] - t[0]) / (rows - 1) as f64;
+        let tolerance = UNIFORM_TOLERANCE * even;
+        let uniform = t.iter().enumerate().all(|(k, &t_k)| (t_k - t[0] - k as f64 * even).abs() <= tolerance);
+        let sample_time_s = if uniform { even } else { typical_step(&t, even) };
+        let mut segments = vec![0];
+        if !uniform {
+            let gap = GAP_SAMPLES * sample_time_s * (1.0 + UNIFORM_TOLERANCE);
+            segments.extend((1..rows).filter(|&k| t[k] - t[k - 1] > gap));
+            if segments.len() > rows / MIN_ROWS {
+                // Rows this scattered have no sample time to speak of: one segment, exact stamps.
+                segments.truncate(1);
+            }
+        }
+        let (u_ref, y_ref) = (mean(&u), mean(&y));
+        Self { t, u, y, u_before, u_ref, y_ref, sample_time_s, uniform, segments, free }
+    }
+
+    /// Rows.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// From the first to the last stamp, in seconds.
+    pub fn span_s(&self) -> f64 {
+        self.t[self.len() - 1] - self.t[0]
+    }
+
+    /// Rows of segment `s`.
+    pub fn segment(&self, s: usize) -> std::ops::Range<usize> {
+        self.segments[s]..self.segments.get(s + 1).copied().unwrap_or(self.len())
+    }
+
+    /// Number of unknowns of the FOPDT model on this stretch.
+    pub fn unknowns(&self) -> usize {
+        4 + if self.free { self.segments.len() } else { 0 }
+    }
+
+    /// A copy with one row for each `factor`: the MV's mean from that row to the next, the PV's mean around it.
+    /// Good for a start: dynamics slower than `factor` samples survive.
+    pub fn thinned(&self, factor: usize) -> Stretch<'static> {
+        let rows = self.len() / factor + self.segments.len();
+        let (mut t, mut u, mut y) =
+            (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
+        for s in 0..self.segments.len() {
+            let range = self.segment(s);
+            for first in range.clone().step_by(factor) {
+                let next = (first + factor).min(range.end);
+                let half = (factor / 2).min(first - range.start).min(range.end - 1 - first);
+                t.push(self.t[first]);
+                u.push(self.mean_mv(first, next));
+                y.push(mean(&self.y[first - half..=first + half]));
+            }
+        }
+        Stretch::new(t.into(), u.into(), y.into(), self.u_before, self.free)
+    }
+
+    fn mean_mv(&self, first: usize, next: usize) -> f64 {
+        if self.uniform {
+            return mean(&self.u[first..next]);
+        }
+        let last = next.min(self.len() - 1);
+        let length = self.t[last] - self.t[first];
+        if length <= 0.0 {
+            return mean(&self.u[first..next]);
+        }
+        (first..last).map(|k| self.u[k] * (self.t[k + 1] - self.t[k])).sum::<f64>() / length
+    }
+}
+
+pub(super) fn mean(values: &[f64]) -> f64 {
+    let mut lanes = [0.0; 4];
+    let chunks = values.chunks_exact(4);
+    let rest: f64 = chunks.remainder().iter().sum();
+    for chunk in chunks {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane += value;
+        }
+    }
+    (lanes.iter().sum::<f64>() + rest) / values.len() as f64
+}
+
+/// Median of the positive steps; of a sample of them when there are many.
+fn typical_step(t: &[f64], fallback: f64) -> f64 {
+    let stride = t.len() / 4096 + 1;
+    let mut steps: Vec<f64> = (1..t.len()).step_by(stride).map(|k| t[k] - t[k - 1]).collect();
+    steps.retain(|&step| step > 0.0);
+    if steps.is_empty() {
+        return fallback;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
