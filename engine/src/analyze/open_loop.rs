@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::grid::features;
 use super::roots::{at_j_omega, product, push_roots};
 use crate::control::PidGains;
 use crate::model::ProcessModel;
@@ -27,7 +28,7 @@ pub struct OpenLoop {
 
 /// First term of a function of s at one end of the imaginary axis: `coefficient · s^power`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Asymptote {
+pub(crate) struct Asymptote {
     pub coefficient: f64,
     pub power: i32,
 }
@@ -138,7 +139,13 @@ impl OpenLoop {
         (self.kc, self.inverse_ti, n, self.filter_s)
     }
 
-    pub(super) fn process_low(&self) -> Asymptote {
+    /// The lowest of the loop's own frequencies in rad/s: poles, zeros and 1/θ.
+    pub(crate) fn lowest_frequency(&self) -> f64 {
+        features(self, &[])[0]
+    }
+
+    /// G for s → 0.
+    pub(crate) fn process_low(&self) -> Asymptote {
         low_asymptote(&self.process_num, &self.process_den)
     }
 

@@ -4,8 +4,10 @@ use super::gram::{Linear, Projected, project};
 use super::problem::Stretch;
 use super::response::{Dynamics, pass};
 
-/// A step below this many standard errors changes nothing a reader could see.
-const STEP_IN_STANDARD_ERRORS: f64 = 1e-3;
+/// A step below this many standard errors changes nothing a reader could see; and where passes are dear.
+const STEP_IN_STANDARD_ERRORS: [f64; 2] = [1e-5, 1e-3];
+/// Rows above which passes are dear.
+const MANY_ROWS: usize = 100_000;
 /// A step this small, relative to T, is at the end of the digits.
 const STEP_AT_ROUNDING: f64 = 1e-12;
 /// Largest change of ln T in a step.
@@ -74,6 +76,7 @@ pub(super) fn refine(
     *evaluations += 1;
     let mut best = evaluate(stretch, bounds.clip(start), &no_reference(stretch))?;
     let spare = stretch.len().saturating_sub(stretch.unknowns()).max(1) as f64;
+    let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
     let mut damping = 1e-6;
     for _ in 1..passes {
         let reduced = reduce(&best.projected);
@@ -81,7 +84,7 @@ pub(super) fn refine(
         let target = moved(best.dynamics, step, bounds);
         let taken = difference(best.dynamics, target);
         let variance = best.rss() / spare;
-        if reduced.is_small(taken, variance) {
+        if reduced.is_small(taken, variance, tolerance) {
             break;
         }
         *evaluations += 1;
@@ -150,11 +153,11 @@ impl Reduced {
         if at_zero_dead_time && step[1] <= 0.0 { only_time_constant } else { step }
     }
 
-    fn is_small(&self, step: [f64; 2], variance: f64) -> bool {
+    fn is_small(&self, step: [f64; 2], variance: f64, tolerance: f64) -> bool {
         (0..2).all(|i| {
             // √(1/Hii) is the standard error with the other fixed: the smaller, hence safer, of the two.
             let error = if self.h[i][i] > 0.0 { (variance / self.h[i][i]).sqrt() } else { 0.0 };
-            step[i].abs() <= (STEP_IN_STANDARD_ERRORS * error).max(STEP_AT_ROUNDING)
+            step[i].abs() <= (tolerance * error).max(STEP_AT_ROUNDING)
         })
     }
 }

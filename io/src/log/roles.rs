@@ -1,0 +1,266 @@
+//! Which column is PV, SP, MV and mode: by the words in their names first, by their behaviour where words fail.
+
+use vasos_engine::signal::LogTable;
+
+use super::Roles;
+use super::behaviour::{Behaviour, Motion};
+
+/// A part of a loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Pv,
+    Sp,
+    Mv,
+    Mode,
+}
+
+/// Words that can mean nothing else, in loop and historian tags.
+const CERTAIN: [(&str, Role); 37] = [
+    ("pv", Role::Pv),
+    ("measurement", Role::Pv),
+    ("measured", Role::Pv),
+    ("medida", Role::Pv),
+    ("medicao", Role::Pv),
+    ("sp", Role::Sp),
+    ("sv", Role::Sp),
+    ("setpoint", Role::Sp),
+    ("setpt", Role::Sp),
+    ("spt", Role::Sp),
+    ("target", Role::Sp),
+    ("reference", Role::Sp),
+    ("referencia", Role::Sp),
+    ("ref", Role::Sp),
+    ("desired", Role::Sp),
+    ("desejado", Role::Sp),
+    ("consigne", Role::Sp),
+    ("sollwert", Role::Sp),
+    ("设定", Role::Sp),
+    ("mv", Role::Mv),
+    ("op", Role::Mv),
+    ("co", Role::Mv),
+    ("cv", Role::Mv),
+    ("controlleroutput", Role::Mv),
+    ("command", Role::Mv),
+    ("comando", Role::Mv),
+    ("manipulated", Role::Mv),
+    ("manipulada", Role::Mv),
+    ("actuator", Role::Mv),
+    ("atuador", Role::Mv),
+    ("du", Role::Mv),
+    ("mode", Role::Mode),
+    ("modo", Role::Mode),
+    ("auto", Role::Mode),
+    ("automan", Role::Mode),
+    ("am", Role::Mode),
+    ("betriebsart", Role::Mode),
+];
+
+/// Words of quantities and devices, which lean one way.
+const LIKELY: [(&str, Role); 62] = [
+    ("u", Role::Mv),
+    ("q", Role::Mv),
+    ("heater", Role::Mv),
+    ("heat", Role::Mv),
+    ("aquecedor", Role::Mv),
+    ("resistencia", Role::Mv),
+    ("pump", Role::Mv),
+    ("bomba", Role::Mv),
+    ("valve", Role::Mv),
+    ("valvula", Role::Mv),
+    ("voltage", Role::Mv),
+    ("volt", Role::Mv),
+    ("volts", Role::Mv),
+    ("tensao", Role::Mv),
+    ("pwm", Role::Mv),
+    ("duty", Role::Mv),
+    ("power", Role::Mv),
+    ("potencia", Role::Mv),
+    ("output", Role::Mv),
+    ("saida", Role::Mv),
+    ("input", Role::Mv),
+    ("entrada", Role::Mv),
+    ("opening", Role::Mv),
+    ("abertura", Role::Mv),
+    ("drive", Role::Mv),
+    ("motor", Role::Mv),
+    ("fan", Role::Mv),
+    ("speed", Role::Mv),
+    ("control", Role::Mv),
+    ("controle", Role::Mv),
+    ("inflow", Role::Mv),
+    ("flow", Role::Mv),
+    ("vazao", Role::Mv),
+    ("steam", Role::Mv),
+    ("vapor", Role::Mv),
+    ("level", Role::Pv),
+    ("nivel", Role::Pv),
+    ("temperature", Role::Pv),
+    ("temperatura", Role::Pv),
+    ("temp", Role::Pv),
+    ("pressure", Role::Pv),
+    ("pressao", Role::Pv),
+    ("process", Role::Pv),
+    ("processo", Role::Pv),
+    ("sensor", Role::Pv),
+    ("height", Role::Pv),
+    ("altura", Role::Pv),
+    ("position", Role::Pv),
+    ("posicao", Role::Pv),
+    ("concentration", Role::Pv),
+    ("ph", Role::Pv),
+    ("y", Role::Pv),
+    ("h", Role::Pv),
+    ("t", Role::Pv),
+    ("tt", Role::Pv),
+    ("lt", Role::Pv),
+    ("pt", Role::Pv),
+    ("ft", Role::Pv),
+    ("r", Role::Sp),
+    ("w", Role::Sp),
+    ("ysp", Role::Sp),
+    ("status", Role::Mode),
+];
+
+/// A role a name speaks for, and how loudly: 3 certain and last in the tag, 2 certain, 1 likely.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Hint {
+    role: Role,
+    weight: u8,
+}
+
+/// Proposes columns. PV and MV are only left open when no column moves.
+pub(super) fn propose(table: &LogTable) -> Roles {
+    let columns = &table.columns;
+    let behaviour = Behaviour::of(table);
+    let hints: Vec<Option<Hint>> = columns.iter().map(|c| hint(&c.name, c.unit.as_deref())).collect();
+    let mut taken: Vec<usize> = Vec::new();
+    let moving = |i: usize| !matches!(behaviour.motion[i], Motion::Still | Motion::Counts);
+    let pv = best_named(&hints, Role::Pv, &[], |i| (moving(i), 0));
+    taken.extend(pv);
+    let kin = |i: usize| pv.map_or(0, |pv| kinship(&columns[pv].name, &columns[i].name));
+    let mut mv = best_named(&hints, Role::Mv, &taken, |i| (moving(i), kin(i)));
+    taken.extend(mv);
+    let mut sp = best_named(&hints, Role::Sp, &taken, |i| (true, kin(i)));
+    taken.extend(sp);
+    let mode = best_named(&hints, Role::Mode, &taken, |i| (true, kin(i)))
+        .or_else(|| columns.iter().position(|c| !c.states.is_empty()));
+    taken.extend(mode);
+    // A likely name on a column that never moves gives way to one that does.
+    let named_mv = mv;
+    if let Some(i) = mv
+        && !moving(i)
+        && hints[i].is_some_and(|h| h.weight < 2)
+        && behaviour.any_moving_besides(&taken)
+    {
+        mv = None;
+    }
+    let named_pv = pv;
+    let pv = pv.or_else(|| {
+        sp = sp.or_else(|| behaviour.tracked(&taken).map(|(sp, _)| sp));
+        let tracking = sp.and_then(|sp| behaviour.tracker_of(sp, &taken));
+        let taken: Vec<usize> = taken.iter().copied().chain(sp).collect();
+        tracking.or_else(|| behaviour.responder(&taken))
+    });
+    taken.extend(pv);
+    taken.extend(sp);
+    if mv.is_none() {
+        let unhinted: Vec<usize> = (0..columns.len())
+            .filter(|&i| hints[i].is_some_and(|h| h.role != Role::Mv && h.weight > 0) && named_pv.is_some())
+            .collect();
+        let off: Vec<usize> = taken.iter().chain(&unhinted).copied().collect();
+        mv = pv.and_then(|pv| behaviour.driver_of(pv, sp.is_none() && named_pv.is_none(), &off)).or(named_mv);
+        taken.extend(mv);
+    }
+    if sp.is_none() && named_pv.is_none() {
+        sp = pv.and_then(|pv| behaviour.setpoint_of(pv, &taken));
+    }
+    let name = |i: Option<usize>| i.map(|i| columns[i].name.clone());
+    Roles { pv: name(pv), sp: name(sp), mv: name(mv), mode: name(mode) }
+}
+
+/// The column whose name speaks loudest for a role; then the livelier, the closer kin, the first.
+fn best_named(
+    hints: &[Option<Hint>],
+    role: Role,
+    taken: &[usize],
+    rank: impl Fn(usize) -> (bool, usize),
+) -> Option<usize> {
+    let named = (0..hints.len()).filter(|i| !taken.contains(i));
+    let ranked = named.filter_map(|i| {
+        let weight = hints[i].filter(|h| h.role == role)?.weight;
+        let (lively, kin) = rank(i);
+        // A tag that ends in .PV is the PV even when it stands still; below that, movement decides.
+        let key = (u8::from(weight == 3 && role != Role::Mv) * 2, lively, kin, weight);
+        Some((key, std::cmp::Reverse(i)))
+    });
+    ranked.max().map(|(_, i)| i.0)
+}
+
+/// Characters the names begin with in common, and a large bonus for the same number at the end.
+fn kinship(a: &str, b: &str) -> usize {
+    let common = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).count();
+    let number = |s: &str| -> String {
+        let digits: String =
+            s.chars().rev().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
+        digits
+    };
+    let (na, nb) = (number(a), number(b));
+    common.min(50) + if !na.is_empty() && na == nb { 100 } else { 0 }
+}
+
+fn hint(name: &str, unit: Option<&str>) -> Option<Hint> {
+    let words = words(name);
+    let joined = words.join("");
+    let last = words.iter().rev().find(|w| !w.bytes().all(|b| b.is_ascii_digit()));
+    let certain = |word: &str| CERTAIN.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
+    let two_words = words.windows(2).find_map(|w| certain(&w.concat()));
+    if joined.contains("setpoint") || words.iter().any(|w| w.len() <= 4 && w.len() > 2 && w.ends_with("sp")) {
+        return Some(Hint { role: Role::Sp, weight: 3 });
+    }
+    if let Some(role) = last.and_then(|w| certain(w)).or(two_words) {
+        return Some(Hint { role, weight: 3 });
+    }
+    if let Some(role) = words.iter().find_map(|w| certain(w)) {
+        return Some(Hint { role, weight: 2 });
+    }
+    let likely = |word: &str| LIKELY.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
+    let by_word = words.iter().rev().find_map(|w| likely(w));
+    let by_unit = || match unit?.to_lowercase().as_str() {
+        "v" | "volts" | "pwm" => Some(Role::Mv),
+        "cm" | "mm" | "°c" | "degc" | "degf" | "k" | "bar" | "kpa" => Some(Role::Pv),
+        _ => None,
+    };
+    by_word.or_else(by_unit).map(|role| Hint { role, weight: 1 })
+}
+
+/// Words of a name in lower case without accents: `23LIC0001:InternalSetpoint`, `bomba_1`, `T1`.
+fn words(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut last = ' ';
+    for c in name.chars() {
+        let new = (last.is_lowercase() && c.is_uppercase())
+            || (last.is_ascii_digit() != c.is_ascii_digit() && last.is_alphanumeric())
+            || !last.is_alphanumeric();
+        if c.is_alphanumeric() {
+            let plain: String = c.to_lowercase().map(plain).collect();
+            match words.last_mut() {
+                Some(word) if !new => word.push_str(&plain),
+                _ => words.push(plain),
+            }
+        }
+        last = c;
+    }
+    words
+}
+
+fn plain(c: char) -> char {
+    match c {
+        'á' | 'à' | 'â' | 'ã' | 'ä' => 'a',
+        'é' | 'ê' | 'è' => 'e',
+        'í' | 'ì' => 'i',
+        'ó' | 'ô' | 'õ' | 'ö' => 'o',
+        'ú' | 'ü' => 'u',
+        'ç' => 'c',
+        c => c,
+    }
+}
