@@ -9,6 +9,10 @@ pub trait Explain: std::fmt::Display {
     fn key(&self) -> &'static str;
     /// Values of the placeholders `%{name}` of that sentence, as they are printed.
     fn args(&self) -> Vec<(&'static str, String)>;
+    /// The finding inside this one, which stands for the placeholder `%{error}`.
+    fn cause(&self) -> Option<&dyn Explain> {
+        None
+    }
 }
 
 /// Prints a number for a sentence: up to four significant digits, no trailing zeros.

@@ -8,6 +8,7 @@
 pub mod analyze;
 pub mod control;
 pub mod daq;
+pub mod document;
 pub mod explain;
 pub mod identify;
 pub mod model;

@@ -84,6 +84,13 @@ impl Explain for FileError {
             Self::Rig { name, error } => vec![("name", name.clone()), ("error", error.to_string())],
         }
     }
+
+    fn cause(&self) -> Option<&dyn Explain> {
+        match self {
+            Self::Rig { error, .. } => Some(error),
+            _ => None,
+        }
+    }
 }
 
 impl FileError {

@@ -78,10 +78,28 @@ fn worst_difference(run: &Run, golden: &[Vec<f64>], columns: &[(&str, usize)]) -
 /// simtank_*.csv: scipy without regularisation; issue: 0.02 cm with δ = 0.05, 1e-4 cm with δ = 0.
 #[test]
 fn val_simtank_runs_agree_with_scipy() {
-    type Case = (&'static str, &'static str, &'static [(&'static str, f64)], &'static [(&'static str, f64)], &'static [&'static str]);
+    type Case = (
+        &'static str,
+        &'static str,
+        &'static [(&'static str, f64)],
+        &'static [(&'static str, f64)],
+        &'static [&'static str],
+    );
     let cases: [Case; 4] = [
-        (include_str!("../../assets/golden/simtank_one_tank_q25.csv"), "simtank1", &[("BA01", 25.0)], &[], &[]),
-        (include_str!("../../assets/golden/simtank_two_tanks_q25_0.csv"), "simtank2", &[("BA01", 25.0), ("BA02", 0.0)], &[], &[]),
+        (
+            include_str!("../../assets/golden/simtank_one_tank_q25.csv"),
+            "simtank1",
+            &[("BA01", 25.0)],
+            &[],
+            &[],
+        ),
+        (
+            include_str!("../../assets/golden/simtank_two_tanks_q25_0.csv"),
+            "simtank2",
+            &[("BA01", 25.0), ("BA02", 0.0)],
+            &[],
+            &[],
+        ),
         (
             include_str!("../../assets/golden/simtank_two_tanks_q25_15_V2closed_h10_5.csv"),
             "simtank2",
@@ -126,13 +144,26 @@ fn val_simtank_runs_agree_with_scipy() {
 /// simtank.json: steady levels of one tank, q = 20, 25, 30 and 40 cm³/s; with δ → 0 the closed form (q/k)².
 #[test]
 fn val_steady_levels_are_those_of_the_closed_form() {
-    let golden = [(20.0, 5.935_224_588_652_123), (25.0, 9.273_788_419_768_941), (30.0, 13.354_255_324_467_275), (40.0, 23.740_898_354_608_493)];
+    let golden = [
+        (20.0, 5.935_224_588_652_123),
+        (25.0, 9.273_788_419_768_941),
+        (30.0, 13.354_255_324_467_275),
+        (40.0, 23.740_898_354_608_493),
+    ];
     let mut spec = preset("simtank1").expect("preset").spec.clone();
     spec.delta_cm = 0.0;
     let plant = Plant::new(Arc::new(Network::new(spec).expect("valid"))).expect("starts");
     for (flow, level_cm) in golden {
-        let state = steady_at_level(plant.network(), plant.coefficients(), plant.inputs(), plant.levels_cm(), 0, 0, level_cm)
-            .expect("reachable");
+        let state = steady_at_level(
+            plant.network(),
+            plant.coefficients(),
+            plant.inputs(),
+            plant.levels_cm(),
+            0,
+            0,
+            level_cm,
+        )
+        .expect("reachable");
         assert!((state.inputs[0] - flow).abs() < 1e-9 * flow, "{flow}: {}", state.inputs[0]);
     }
 }
@@ -148,9 +179,16 @@ fn val_operating_points_of_the_reference_rig() {
         }
         let network = plant.network().clone();
         let tank = network.tank(tank).expect("there");
-        let state =
-            steady_at_level(&network, plant.coefficients(), plant.inputs(), plant.levels_cm(), 0, tank, level_cm)
-                .expect("reachable");
+        let state = steady_at_level(
+            &network,
+            plant.coefficients(),
+            plant.inputs(),
+            plant.levels_cm(),
+            0,
+            tank,
+            level_cm,
+        )
+        .expect("reachable");
         let u0 = rig[case]["u0_v"].as_f64().expect("u0");
         assert!((state.inputs[0] - u0).abs() < 1e-7, "{case}: {} V against {u0} V", state.inputs[0]);
     }
@@ -163,7 +201,8 @@ fn val_operating_points_of_the_reference_rig() {
             plant.set_angle(i, angle).expect("possible");
         }
         let network = plant.network().clone();
-        let levels = vasos_engine::plant::steady_levels(&network, plant.coefficients(), &[3.5], plant.levels_cm());
+        let levels =
+            vasos_engine::plant::steady_levels(&network, plant.coefficients(), &[3.5], plant.levels_cm());
         let level = levels[network.tank(tank).expect("there")];
         assert!((level - highest_cm).abs() < 0.05, "{tank} at {angles:?}: {level} cm");
     }

@@ -86,7 +86,11 @@ impl LoopSpec {
 /// # Errors
 /// [`GainsError::Filter`] outside 0…3600 s.
 pub fn check_filter(pv_filter_s: f64) -> Result<f64, GainsError> {
-    if (0.0..=3600.0).contains(&pv_filter_s) { Ok(pv_filter_s) } else { Err(GainsError::Filter { value: pv_filter_s }) }
+    if (0.0..=3600.0).contains(&pv_filter_s) {
+        Ok(pv_filter_s)
+    } else {
+        Err(GainsError::Filter { value: pv_filter_s })
+    }
 }
 
 /// A loop in operation.

@@ -56,7 +56,8 @@ impl Source for SimulatedRig {
         let p = &self.plant.network().pumps[pump];
         let most = p.rate_limit_per_s * self.plant.network().spec.sample_time_s;
         let last = self.written[pump];
-        let limited = if mv.is_finite() { mv.clamp(last - most, last + most).clamp(p.min, p.max) } else { mv };
+        let limited =
+            if mv.is_finite() { mv.clamp(last - most, last + most).clamp(p.min, p.max) } else { mv };
         let converted = match self.dac_step {
             Some(step) if self.measurement.quantisation => (limited / step).round() * step,
             _ => limited,
@@ -76,6 +77,10 @@ impl Source for SimulatedRig {
 
     fn rig(&mut self) -> Option<&mut dyn RigControls> {
         Some(self)
+    }
+
+    fn measurement(&self) -> Option<Measurement> {
+        Some(self.measurement)
     }
 
     fn plant(&self) -> Option<&Plant> {
@@ -109,12 +114,9 @@ impl RigControls for SimulatedRig {
     }
 
     fn set_state(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), RigError> {
+        self.plant.set_state(levels_cm, inputs)?;
         self.written.copy_from_slice(inputs);
-        self.plant.set_state(levels_cm, inputs)
-    }
-
-    fn measurement(&self) -> Measurement {
-        self.measurement
+        Ok(())
     }
 
     fn set_measurement(&mut self, measurement: Measurement) {

@@ -21,6 +21,8 @@ pub trait Source: Send {
     fn accelerates(&self) -> bool;
     /// Valves, tanks and switches of a rig that has them.
     fn rig(&mut self) -> Option<&mut dyn RigControls>;
+    /// Imperfections that are on, for a simulated rig.
+    fn measurement(&self) -> Option<Measurement>;
     /// True state of a simulated plant.
     fn plant(&self) -> Option<&Plant>;
 }
@@ -47,8 +49,6 @@ pub trait RigControls {
     /// # Errors
     /// [`RigError`] when the water does not fit.
     fn set_state(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), RigError>;
-    /// Which imperfections are on.
-    fn measurement(&self) -> Measurement;
     /// Switches imperfections.
     fn set_measurement(&mut self, measurement: Measurement);
     /// Restarts the noise from a seed.

@@ -43,7 +43,9 @@ pub enum RigError {
         expected: String,
     },
     /// A pump curve that is not a function.
-    #[error("the curve of pump {item} needs at least two points with increasing input and flows of 0 or more")]
+    #[error(
+        "the curve of pump {item} needs at least two points with increasing input and flows of 0 or more"
+    )]
     Curve {
         /// Tag of the pump.
         item: String,

@@ -115,7 +115,13 @@ pub struct Network {
     pub reservoir: Option<usize>,
 }
 
-fn value(item: &str, field: &'static str, value: f64, ok: bool, expected: impl Into<String>) -> Result<(), RigError> {
+fn value(
+    item: &str,
+    field: &'static str,
+    value: f64,
+    ok: bool,
+    expected: impl Into<String>,
+) -> Result<(), RigError> {
     if value.is_finite() && ok {
         Ok(())
     } else {

@@ -68,7 +68,8 @@ impl Pipe {
                 Some(next) => {
                     let volume = rest.duration_s * rest.flow_cm3_s + next.duration_s * next.flow_cm3_s;
                     next.duration_s += rest.duration_s;
-                    next.flow_cm3_s = if rest.duration_s == 0.0 { next.flow_cm3_s } else { volume / next.duration_s };
+                    next.flow_cm3_s =
+                        if rest.duration_s == 0.0 { next.flow_cm3_s } else { volume / next.duration_s };
                 }
                 None => {
                     let duration_s = duration_s + rest.duration_s;

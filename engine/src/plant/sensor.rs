@@ -65,9 +65,8 @@ impl Transmitter {
     /// A sensor, and the converter behind it if the rig has one.
     #[must_use]
     pub fn new(sensor: &SensorSpec, converters: Option<&ConverterSpec>) -> Self {
-        let code_ma = converters.map_or(0.0, |c| {
-            1000.0 * c.adc_full_scale_v / (f64::from(c.adc_bits).exp2() * c.shunt_ohm)
-        });
+        let code_ma = converters
+            .map_or(0.0, |c| 1000.0 * c.adc_full_scale_v / (f64::from(c.adc_bits).exp2() * c.shunt_ohm));
         Self {
             noise_cm: sensor.noise_cm,
             resolution_cm: sensor.resolution_cm,
@@ -137,7 +136,8 @@ mod tests {
         let t = Transmitter::new(&sensor, Some(&converters));
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
         let how = Measurement { noise: false, quantisation: true, resolution: false };
-        let mut seen: Vec<f64> = (0..4000).map(|i| t.measure(10.0 + f64::from(i) * 1e-4, how, &mut rng).level_cm).collect();
+        let mut seen: Vec<f64> =
+            (0..4000).map(|i| t.measure(10.0 + f64::from(i) * 1e-4, how, &mut rng).level_cm).collect();
         seen.dedup();
         let step = (seen[20] - seen[10]) / 10.0;
         assert!((step - 0.014_65).abs() < 1e-5, "{step}");

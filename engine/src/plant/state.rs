@@ -210,7 +210,12 @@ impl Plant {
     pub fn set_input(&mut self, pump: usize, input: f64) -> Result<(), RigError> {
         if !input.is_finite() {
             let item = self.network.spec.pumps[pump].id.clone();
-            return Err(RigError::Value { item, field: "input", value: input, expected: "finite".to_owned() });
+            return Err(RigError::Value {
+                item,
+                field: "input",
+                value: input,
+                expected: "finite".to_owned(),
+            });
         }
         let p = &self.network.pumps[pump];
         self.inputs[pump] = input.clamp(p.min, p.max);
@@ -248,7 +253,12 @@ impl Plant {
     pub fn bump(&mut self, tank: usize, delta_cm: f64) -> Result<f64, RigError> {
         if !delta_cm.is_finite() {
             let item = self.network.spec.tanks[tank].id.clone();
-            return Err(RigError::Value { item, field: "bump_cm", value: delta_cm, expected: "finite".to_owned() });
+            return Err(RigError::Value {
+                item,
+                field: "bump_cm",
+                value: delta_cm,
+                expected: "finite".to_owned(),
+            });
         }
         let tanks = &self.network.tanks;
         let wanted = (self.levels_cm[tank] + delta_cm).clamp(0.0, tanks[tank].height_cm);
@@ -258,12 +268,13 @@ impl Plant {
                 let held = self.levels_cm[r] * tanks[r].area_cm2;
                 let room = tanks[r].height_cm * tanks[r].area_cm2 - held;
                 volume_cm3 = volume_cm3.clamp(-room, held);
-                self.levels_cm[r] -= volume_cm3 / tanks[r].area_cm2;
+                let left_cm = self.levels_cm[r] - volume_cm3 / tanks[r].area_cm2;
+                self.levels_cm[r] = left_cm.clamp(0.0, tanks[r].height_cm);
             }
             None => self.outside_cm3 -= volume_cm3,
         }
         let change_cm = volume_cm3 / tanks[tank].area_cm2;
-        self.levels_cm[tank] += change_cm;
+        self.levels_cm[tank] = (self.levels_cm[tank] + change_cm).clamp(0.0, tanks[tank].height_cm);
         Ok(change_cm)
     }
 
@@ -273,12 +284,16 @@ impl Plant {
     /// # Errors
     /// [`RigError::Water`] when the water does not fit.
     pub fn set_state(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), RigError> {
+        let before = (self.levels_cm.clone(), self.inputs.clone(), self.pipes.clone());
         self.levels_cm.copy_from_slice(levels_cm);
         self.inputs.copy_from_slice(inputs);
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
             *pipe = Pipe::filled(pipe.delay_s(), self.network.pumps[i].flow_cm3_s(inputs[i]));
         }
-        self.fill_reservoir()?;
+        if let Err(error) = self.fill_reservoir() {
+            (self.levels_cm, self.inputs, self.pipes) = before;
+            return Err(error);
+        }
         self.refresh_flows();
         Ok(())
     }
@@ -533,7 +548,7 @@ impl Plant {
     fn book(&mut self, h: f64) {
         let work = &mut self.work;
         for (i, tank) in self.network.tanks.iter().enumerate() {
-            self.levels_cm[i] = (work.after[i] / tank.area_cm2).max(0.0);
+            self.levels_cm[i] = (work.after[i] / tank.area_cm2).clamp(0.0, tank.height_cm);
             if tank.spills_to.is_none() {
                 self.outside_cm3 += work.spill_volume[i];
             }

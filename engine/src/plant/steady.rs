@@ -22,22 +22,31 @@ pub struct SteadyState {
 /// `coefficients` are k(α) of the valves, `inputs` the pumps' inputs, `guess_cm` levels in cm.
 #[must_use]
 pub fn steady_levels(network: &Network, coefficients: &[f64], inputs: &[f64], guess_cm: &[f64]) -> Vec<f64> {
+    // From a good guess plain Newton gets there at once.
+    if let Some(levels) = implicit_step(network, coefficients, inputs, guess_cm, LONGEST_STEP_S) {
+        return levels;
+    }
     let mut levels = guess_cm.to_vec();
     let mut step_s = 1.0;
-    while step_s < 1e9 {
+    for _ in 0..MOST_STEPS {
         match implicit_step(network, coefficients, inputs, &levels, step_s) {
             Some(next) => {
                 levels = next;
-                step_s *= 3.0;
+                if step_s >= LONGEST_STEP_S {
+                    break;
+                }
+                step_s = (3.0 * step_s).min(LONGEST_STEP_S);
             }
-            None => step_s *= 0.3,
-        }
-        if step_s < 1e-6 {
-            break;
+            None => step_s *= 0.2,
         }
     }
     levels
 }
+
+/// Longer than any rig takes to settle, in seconds.
+const LONGEST_STEP_S: f64 = 1e9;
+/// Bound on the steps of the continuation.
+const MOST_STEPS: usize = 120;
 
 fn implicit_step(
     network: &Network,
@@ -69,7 +78,7 @@ fn implicit_step(
             largest = largest.max((next - levels[i]).abs());
             levels[i] = next;
         }
-        if largest < 1e-13 * 10.0 {
+        if largest < 1e-12 {
             return Some(levels);
         }
     }
@@ -77,7 +86,12 @@ fn implicit_step(
 }
 
 /// dh/dt in cm/s and its Jacobian with respect to the levels in 1/s.
-fn rates(network: &Network, coefficients: &[f64], inputs: &[f64], levels: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
+fn rates(
+    network: &Network,
+    coefficients: &[f64],
+    inputs: &[f64],
+    levels: &[f64],
+) -> (Vec<f64>, DMatrix<f64>) {
     let n = levels.len();
     let mut rate = vec![0.0; n];
     let mut jacobian = DMatrix::zeros(n, n);

@@ -1,5 +1,151 @@
 //! The running loop on its own worker thread: commands in, snapshots, samples and events out.
+//!
+//! A [`Session`] never blocks its caller: commands go into a bounded queue, the snapshot is swapped, samples
+//! and events are fetched when it suits. Samples wait for a slow reader and are given up only beyond half a
+//! million, which is an event.
 
+mod alarms;
 mod command;
+mod event;
+mod sink;
+mod snapshot;
+mod worker;
+
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use crossbeam_channel::{Receiver, Sender, bounded};
 
 pub use command::{CommandError, RigCommand};
+pub use event::{Alarm, Event, EventKind};
+pub use sink::Sink;
+pub use snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
+
+use crate::plant::{Measurement, Network};
+use crate::signal::SampleBlock;
+use crate::sim::ClosedLoop;
+use worker::{Ports, Worker};
+
+/// Called from the worker's thread whenever there is something new to fetch.
+pub type Notify = Box<dyn Fn() + Send>;
+
+/// A simulated rig to run.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    /// Its structure.
+    pub network: Arc<Network>,
+    /// Index of the configuration to start in.
+    pub configuration: usize,
+    /// Imperfections.
+    pub measurement: Measurement,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// What a session can be told.
+pub enum SessionCommand {
+    /// Something of the rig or its loops.
+    Rig(RigCommand),
+    /// Let time go on.
+    Run,
+    /// Let time stand still.
+    Pause,
+    /// Take one sample and stand still.
+    Step,
+    /// Times real time, 1 to 1000.
+    Speed(f64),
+    /// Start a new run on a rig.
+    Load(Box<Rig>),
+    /// Send everything from now on to a sink as well.
+    Attach {
+        /// Name for [`SessionCommand::Detach`].
+        id: u64,
+        /// The sink.
+        sink: Box<dyn Sink>,
+    },
+    /// Let go of a sink.
+    Detach {
+        /// Its name.
+        id: u64,
+    },
+    /// End the worker.
+    Shutdown,
+}
+
+/// A running session; dropping it ends the worker.
+pub struct Session {
+    commands: Sender<SessionCommand>,
+    blocks: Receiver<SampleBlock>,
+    events: Receiver<Event>,
+    latest: Arc<Mutex<Arc<Snapshot>>>,
+    worker: Option<JoinHandle<()>>,
+}
+
+impl Session {
+    /// Starts a worker on a rig, paused at time 0.
+    ///
+    /// # Errors
+    /// [`CommandError`] when the rig cannot start in that configuration.
+    ///
+    /// # Panics
+    /// When the system cannot start a thread.
+    pub fn start(rig: &Rig, notify: Notify) -> Result<Self, CommandError> {
+        let closed =
+            ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed)?;
+        let (commands, command_queue) = bounded(4096);
+        let (block_queue, blocks) = bounded(256);
+        let (event_queue, events) = bounded(4096);
+        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(rig.network.clone()))));
+        let ports = Ports {
+            commands: command_queue,
+            blocks: block_queue,
+            events: event_queue,
+            latest: latest.clone(),
+            notify,
+        };
+        let worker = Worker::new(closed, ports);
+        if let Ok(mut first) = latest.lock() {
+            *first = Arc::new(worker.snapshot());
+        }
+        let worker = std::thread::Builder::new()
+            .name("vasos-session".to_owned())
+            .spawn(move || worker.run())
+            .expect("the system can start a thread");
+        Ok(Self { commands, blocks, events, latest, worker: Some(worker) })
+    }
+
+    /// Sends a command without waiting; false when the queue is full or the worker gone, and the command
+    /// is not carried out.
+    #[must_use]
+    pub fn send(&self, command: SessionCommand) -> bool {
+        self.commands.try_send(command).is_ok()
+    }
+
+    /// The present state.
+    #[must_use]
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        match self.latest.lock() {
+            Ok(latest) => latest.clone(),
+            Err(poisoned) => poisoned.into_inner().clone(),
+        }
+    }
+
+    /// Samples since the last call.
+    pub fn samples(&self) -> impl Iterator<Item = SampleBlock> + '_ {
+        self.blocks.try_iter()
+    }
+
+    /// Events since the last call.
+    pub fn events(&self) -> impl Iterator<Item = Event> + '_ {
+        self.events.try_iter()
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let asked = self.commands.send_timeout(SessionCommand::Shutdown, std::time::Duration::from_secs(1));
+        if let (Ok(()), Some(worker)) = (asked, self.worker.take()) {
+            drop(worker.join());
+        }
+    }
+}

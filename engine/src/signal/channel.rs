@@ -67,7 +67,11 @@ impl ChannelSet {
             push(format!("{}_cm", tank.signal), "cm", ChannelKind::Level(i));
         }
         for (i, pump) in spec.pumps.iter().enumerate() {
-            push(format!("{}_{}", pump.signal, pump.unit.suffix()), pump.unit.symbol(), ChannelKind::Input(i));
+            push(
+                format!("{}_{}", pump.signal, pump.unit.suffix()),
+                pump.unit.symbol(),
+                ChannelKind::Input(i),
+            );
             push(format!("{}_cm3_s", pump.flow_signal), "cm³/s", ChannelKind::Arriving(i));
         }
         for (i, valve) in spec.valves.iter().enumerate() {

@@ -117,7 +117,11 @@ impl Pyramid {
                 out.push([late, b]);
             }
         }
-        out.extend(((end * size).max(first)..last).map(|i| [self.time_s[i], self.values[i]]).filter(|p| !p[1].is_nan()));
+        out.extend(
+            ((end * size).max(first)..last)
+                .map(|i| [self.time_s[i], self.values[i]])
+                .filter(|p| !p[1].is_nan()),
+        );
     }
 }
 
@@ -147,7 +151,13 @@ mod tests {
     fn no_peak_is_lost_at_any_zoom() {
         let mut p = Pyramid::default();
         for i in 0..100_000 {
-            let value = if i == 54_321 { 9.0 } else if i == 12_345 { -9.0 } else { f64::from(i % 7) * 0.1 };
+            let value = if i == 54_321 {
+                9.0
+            } else if i == 12_345 {
+                -9.0
+            } else {
+                f64::from(i % 7) * 0.1
+            };
             p.push(f64::from(i) * 0.2, value);
         }
         let mut out = Vec::new();
@@ -155,7 +165,11 @@ mod tests {
             p.draw(0.0, 20_000.0, pixels, &mut out);
             let (low, high) = out.iter().fold((0.0_f64, 0.0_f64), |(l, h), q| (l.min(q[1]), h.max(q[1])));
             assert_eq!((low, high), (-9.0, 9.0), "at {pixels} pixels");
-            assert!(out.len() <= 100_000.min(34 * pixels.max(16)), "{} points for {pixels} pixels", out.len());
+            assert!(
+                out.len() <= 100_000.min(34 * pixels.max(16)),
+                "{} points for {pixels} pixels",
+                out.len()
+            );
             assert!(out.windows(2).all(|w| w[0][0] <= w[1][0]), "time goes forward");
         }
         p.draw(100.0, 110.0, 500, &mut out);

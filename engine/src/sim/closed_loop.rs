@@ -98,6 +98,12 @@ impl ClosedLoop {
         self.source.rig()
     }
 
+    /// Imperfections that are on, where the source is a rig.
+    #[must_use]
+    pub fn measurement(&self) -> Option<Measurement> {
+        self.source.measurement()
+    }
+
     /// Columns of a row.
     #[must_use]
     pub fn channels(&self) -> &Arc<ChannelSet> {
@@ -159,7 +165,9 @@ impl ClosedLoop {
             let of = |values: Option<&[f64]>, i: usize| values.map_or(f64::NAN, |v| v[i]);
             *value = match channel.kind {
                 ChannelKind::Setpoint(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.setpoint_cm),
-                ChannelKind::Pv(i) => self.loops.get(i).map_or(f64::NAN, |l| self.readings[l.sensor].level_cm),
+                ChannelKind::Pv(i) => {
+                    self.loops.get(i).map_or(f64::NAN, |l| self.readings[l.sensor].level_cm)
+                }
                 ChannelKind::Mv(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.mv()),
                 ChannelKind::Level(i) => of(plant.map(|p| p.levels_cm()), i),
                 ChannelKind::Input(i) => of(plant.map(|p| p.inputs()), i),

@@ -130,6 +130,13 @@ impl Explain for ScenarioError {
             }
         }
     }
+
+    fn cause(&self) -> Option<&dyn Explain> {
+        match self {
+            Self::Command { error, .. } => Some(error),
+            _ => None,
+        }
+    }
 }
 
 /// Runs a scenario on a rig from start to end.
@@ -189,7 +196,9 @@ fn set_start(closed: &mut ClosedLoop, start: &Start) -> Result<(), CommandError>
         let rim = network.tanks[tank].height_cm;
         if !(0.0..=rim).contains(&level_cm) {
             let expected = format!("0…{rim} (rim)");
-            return Err(RigError::Value { item: tag.clone(), field: "levels_cm", value: level_cm, expected }.into());
+            return Err(
+                RigError::Value { item: tag.clone(), field: "levels_cm", value: level_cm, expected }.into()
+            );
         }
         levels[tank] = level_cm;
     }

@@ -1,0 +1,66 @@
+//! What panes ask for. One dispatcher carries it out.
+
+use std::path::PathBuf;
+
+use vasos_engine::document::DocumentCommand;
+use vasos_engine::session::RigCommand;
+
+use crate::i18n::Language;
+use crate::panes::PaneKind;
+
+/// Something a pane, a menu or a key asks for.
+#[derive(Debug, Clone)]
+pub enum Action {
+    /// A change that can be undone.
+    Document(DocumentCommand),
+    /// The change before this was the last of its drag.
+    Seal,
+    /// Something of the rig that is no setting: a bump, an output in manual.
+    Rig(RigCommand),
+    /// Take back.
+    Undo,
+    /// Do again.
+    Redo,
+    /// Let time go on, or stand still.
+    ToggleRunning,
+    /// One sample.
+    Step,
+    /// Times real time.
+    Speed(f64),
+    /// Start the run again as the rig file and the settings have it.
+    Restart,
+    /// Rest at the loop's setpoint.
+    SteadyAt(String, f64),
+    /// Open a preset.
+    OpenPreset(&'static str),
+    /// Ask for a file and open it.
+    AskFile,
+    /// Open a file: a log or a rig.
+    OpenFile(PathBuf),
+    /// Begin or end a recording.
+    ToggleRecording,
+    /// Record every run from the start.
+    RecordAlways(bool),
+    /// Switch the language.
+    Language(Language),
+    /// Switch between light and dark.
+    ToggleTheme,
+    /// Size of everything on the screen, 1 being normal.
+    Zoom(f32),
+    /// Keep the present run behind the next.
+    KeepRun,
+    /// Forget the kept run.
+    DropKeptRun,
+    /// Fit a model to the chosen stretch.
+    Identify,
+    /// Show a pane alone, or all of them again.
+    Maximise(PaneKind),
+    /// Panes as at the first start.
+    ResetLayout,
+    /// Save the trend's samples in view as CSV.
+    ExportTrend,
+    /// Empty the log.
+    ClearLog,
+    /// Put words on the clipboard.
+    Copy(String),
+}

@@ -1,0 +1,215 @@
+//! The faceplate of a loop: PV, SP and MV on bars, mode, keys, tuning in use, alarms.
+
+use eframe::egui::{self, Align2, Color32, FontId, Rect, Sense, Stroke, WidgetInfo, WidgetType, pos2, vec2};
+use vasos_engine::control::{Mode, PidGains, PidTuning};
+use vasos_engine::document::DocumentCommand;
+use vasos_engine::session::{LoopNow, RigCommand};
+
+use crate::action::Action;
+use crate::panes::View;
+use crate::widgets::segmented;
+use crate::{text, theme, tr};
+
+/// State of the pane.
+#[derive(Default)]
+pub struct State {
+    shown: usize,
+}
+
+/// Draws the pane.
+pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
+    let mut actions = vec![];
+    let loops = &view.snapshot.loops;
+    state.shown = state.shown.min(loops.len().saturating_sub(1));
+    let Some(now) = loops.get(state.shown) else {
+        ui.weak(tr!("faceplate.none"));
+        return actions;
+    };
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        heading(ui, view, state, now, &mut actions);
+        bars(ui, view, now);
+        setpoint_keys(ui, view, now, &mut actions);
+        tuning(ui, view, now, &mut actions);
+        alarms(ui, view, now);
+    });
+    actions
+}
+
+fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, actions: &mut Vec<Action>) {
+    if view.snapshot.loops.len() > 1 {
+        let tags: Vec<String> = view.snapshot.loops.iter().map(|l| l.tag.clone()).collect();
+        if let Some(chosen) = segmented(ui, &tr!("faceplate.loop"), &tags, state.shown) {
+            state.shown = chosen;
+        }
+    } else {
+        ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
+    }
+    let modes = [tr!("mode.man"), tr!("mode.auto")];
+    let chosen = usize::from(now.mode == Mode::Automatic);
+    if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {
+        let mode = if chosen == 1 { Mode::Automatic } else { Mode::Manual };
+        actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), mode)));
+    }
+}
+
+fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
+    let p = theme::palette(ui);
+    let network = &view.snapshot.network;
+    let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
+    let pump = &network.pumps[now.pump];
+    let unit = network.spec.pumps[now.pump].unit.symbol();
+    let height = (ui.available_height() - 250.0).clamp(60.0, 230.0);
+    let columns = [
+        ("PV", now.pv_cm, 0.0, rim, "cm", 2, p.pv),
+        ("SP", now.setpoint_cm, 0.0, rim, "cm", 2, p.sp),
+        ("MV", now.mv, pump.min, pump.max, unit, 2, p.mv),
+    ];
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 56.0), Sense::hover());
+    response.widget_info(|| {
+        let words = columns.map(|(n, v, .., u, d, _)| format!("{n} {} {u}", text::fixed(v, d))).join(", ");
+        WidgetInfo::labeled(WidgetType::Label, true, words)
+    });
+    let width = rect.width() / 3.0;
+    for (i, (name, value, low, high, unit, decimals, colour)) in columns.into_iter().enumerate() {
+        let x = rect.left() + width * (i as f32 + 0.5);
+        let well = Rect::from_center_size(pos2(x, rect.top() + 18.0 + height * 0.5), vec2(26.0, height));
+        ui.painter().text(pos2(x, rect.top()), Align2::CENTER_TOP, name, theme::bold_font(13.0), colour);
+        bar(ui, well, ((value - low) / (high - low)) as f32, colour, &p);
+        let reading = text::fixed(value, decimals);
+        let at = pos2(x, well.bottom() + 3.0);
+        ui.painter().text(at, Align2::CENTER_TOP, reading, theme::bold_font(17.0), p.text);
+        ui.painter().text(at + vec2(0.0, 20.0), Align2::CENTER_TOP, unit, FontId::proportional(12.0), p.weak);
+        for (share, value) in [(1.0, high), (0.0, low)] {
+            let y = well.bottom() - share * well.height();
+            let at = pos2(well.right() + 3.0, y);
+            let align = if share > 0.5 { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
+            ui.painter().text(at, align, text::brief(value), FontId::proportional(10.0), p.weak);
+        }
+    }
+}
+
+fn bar(ui: &egui::Ui, well: Rect, share: f32, colour: Color32, p: &theme::Palette) {
+    ui.painter().rect(well, 2.0, p.well, Stroke::new(1.0, p.edge), egui::StrokeKind::Inside);
+    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    let top = well.bottom() - share * well.height();
+    ui.painter().rect_filled(Rect::from_min_max(pos2(well.left() + 1.0, top), well.max - vec2(1.0, 1.0)), 1.0, colour);
+    for tick in 1..4 {
+        let y = well.bottom() - well.height() * tick as f32 / 4.0;
+        ui.painter().hline(well.left()..=well.left() + 4.0, y, Stroke::new(1.0, p.weak));
+    }
+}
+
+fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
+    let network = &view.snapshot.network;
+    let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
+    let pump = &network.pumps[now.pump];
+    let manual = now.mode == Mode::Manual;
+    let (label, value, low, high, unit) = if manual {
+        (tr!("faceplate.output"), now.mv, pump.min, pump.max, network.spec.pumps[now.pump].unit.symbol())
+    } else {
+        (tr!("faceplate.setpoint"), now.setpoint_cm, 0.0, rim, "cm")
+    };
+    let set = |value: f64| {
+        let value = value.clamp(low, high);
+        if manual {
+            Action::Rig(RigCommand::Mv { tag: now.tag.clone(), value })
+        } else {
+            Action::Document(DocumentCommand::Setpoint(now.tag.clone(), value))
+        }
+    };
+    ui.horizontal(|ui| {
+        let name = ui.label(label);
+        let mut edited = value;
+        let field = egui::DragValue::new(&mut edited)
+            .range(low..=high)
+            .speed((high - low) / 500.0)
+            .max_decimals(3)
+            .suffix(format!(" {unit}"));
+        let response = ui.add(field).labelled_by(name.id);
+        if response.changed() {
+            actions.push(set(edited));
+        }
+        if response.drag_stopped() || response.lost_focus() {
+            actions.push(Action::Seal);
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        let width = (ui.available_width() - 9.0) / 4.0;
+        for percent in [-10.0, -1.0, 1.0, 10.0] {
+            let sign = if percent > 0.0 { "+" } else { "−" };
+            let key = egui::Button::new(format!("{sign}{} %", f64::abs(percent))).min_size(vec2(width, theme::PRESS));
+            let key = ui.add_sized([width, theme::PRESS], key).on_hover_text(tr!("faceplate.keys_hint"));
+            if key.clicked() {
+                actions.push(set(value + percent / 100.0 * (high - low)));
+                actions.push(Action::Seal);
+            }
+        }
+    });
+    if ui.button(tr!("faceplate.steady")).on_hover_text(tr!("faceplate.steady_hint")).clicked() {
+        actions.push(Action::SteadyAt(now.tag.clone(), now.setpoint_cm));
+    }
+}
+
+fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
+    let Some(settings) = view.document.rig.loops.get(&now.tag) else { return };
+    let unit = view.snapshot.network.spec.pumps[now.pump].unit.symbol();
+    let action = if now.tuning.gains.kc > 0.0 { tr!("faceplate.reverse") } else { tr!("faceplate.direct") };
+    ui.label(egui::RichText::new(format!("PID-I2GL · {action}")).small());
+    let PidTuning { gains, b, c } = settings.tuning;
+    let mut edited = settings.tuning;
+    let mut filter_s = settings.pv_filter_s;
+    let mut changed = false;
+    let mut filter_changed = false;
+    let mut done = false;
+    egui::Grid::new("tuning").num_columns(4).spacing([5.0, 3.0]).show(ui, |ui| {
+        let mut field = |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
+            let name = ui.label(name).on_hover_text(&hint);
+            let drag = egui::DragValue::new(value).speed(speed).max_decimals(3).suffix(suffix);
+            let response = ui.add_sized([74.0, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
+            done |= response.drag_stopped() || response.lost_focus();
+            response.changed()
+        };
+        let speed = |v: f64| (v.abs() / 100.0).max(0.001);
+        changed |= field(ui, "Kc", tr!("gain.kc"), &mut edited.gains.kc, format!(" {unit}/cm"), speed(gains.kc));
+        changed |= field(ui, "Ti", tr!("gain.ti"), &mut edited.gains.ti_s, " s".to_owned(), speed(gains.ti_s));
+        ui.end_row();
+        changed |= field(ui, "Td", tr!("gain.td"), &mut edited.gains.td_s, " s".to_owned(), 0.01);
+        changed |= field(ui, "N", tr!("gain.n"), &mut edited.gains.n, String::new(), 0.1);
+        ui.end_row();
+        changed |= field(ui, "b", tr!("gain.b"), &mut edited.b, String::new(), 0.01);
+        filter_changed |= field(ui, "Tf", tr!("gain.pv_filter"), &mut filter_s, " s".to_owned(), 0.02);
+        ui.end_row();
+    });
+    let _ = (b, c, PidGains::DEFAULT_N);
+    if changed {
+        actions.push(Action::Document(DocumentCommand::Tuning(now.tag.clone(), edited)));
+    }
+    if filter_changed {
+        actions.push(Action::Document(DocumentCommand::PvFilter(now.tag.clone(), filter_s)));
+    }
+    if done {
+        actions.push(Action::Seal);
+    }
+    ui.weak(format!("MV {}…{} {unit}", text::brief(view.snapshot.network.pumps[now.pump].min), text::brief(view.snapshot.network.pumps[now.pump].max)));
+}
+
+fn alarms(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
+    let p = theme::palette(ui);
+    let network = &view.snapshot.network;
+    let sensor = &network.spec.sensors[now.sensor].id;
+    let pump = &network.spec.pumps[now.pump].id;
+    let tank = &network.spec.tanks[network.sensors[now.sensor].tank].id;
+    let mine = |tag: &str| tag == now.tag || tag == sensor || tag == pump || tag == tank;
+    let mut any = false;
+    for alarm in view.snapshot.alarms.iter().filter(|a| mine(a.tag())) {
+        any = true;
+        let words = tr!(&format!("alarm.{}", alarm.key()), tag = alarm.tag());
+        egui::Frame::NONE.fill(p.alarm).corner_radius(3).inner_margin(4).show(ui, |ui| {
+            ui.add(egui::Label::new(egui::RichText::new(format!("! {words}")).color(p.on_alarm).small()).wrap());
+        });
+    }
+    if !any {
+        ui.weak(tr!("faceplate.no_alarm"));
+    }
+}

@@ -1,0 +1,236 @@
+//! What the P&ID shows: the snapshot laid out, ready to paint and to test.
+
+use eframe::egui::{Pos2, Rect, pos2};
+use vasos_engine::control::Mode;
+use vasos_engine::plant::ReadingStatus;
+use vasos_engine::session::{Alarm, Snapshot};
+
+use super::layout::{Frame, Layout, Route};
+
+/// Flows smaller than this are drawn as none, in cm³/s.
+pub const STILL_CM3_S: f64 = 0.02;
+
+/// A tank as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TankView {
+    /// Tag.
+    pub tag: String,
+    /// Walls.
+    pub rect: Rect,
+    /// Level in cm.
+    pub level_cm: f64,
+    /// Rim in cm.
+    pub height_cm: f64,
+    /// Surface of the water.
+    pub surface_y: f32,
+    /// Spill in cm³/s.
+    pub spill_cm3_s: f64,
+    /// Where the spill falls: from the rim down.
+    pub spill: [Pos2; 2],
+    /// Setpoint in cm, where a loop holds this tank.
+    pub setpoint_cm: Option<f64>,
+}
+
+/// A stream as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StreamView {
+    /// Corners on the screen, in the direction of a positive flow.
+    pub pipe: Vec<Pos2>,
+    /// Flow in cm³/s; negative against the pipe's direction.
+    pub flow_cm3_s: f64,
+    /// Where the falling water ends, on the surface of its tank.
+    pub falls_to: Option<Pos2>,
+    /// It leaves the drawing.
+    pub to_outside: bool,
+}
+
+impl StreamView {
+    /// −1, 0 or 1: against the pipe, at rest, along it.
+    #[must_use]
+    pub fn direction(&self) -> i8 {
+        if self.flow_cm3_s.abs() < STILL_CM3_S { 0 } else if self.flow_cm3_s > 0.0 { 1 } else { -1 }
+    }
+}
+
+/// A valve as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValveView {
+    /// Tag.
+    pub tag: String,
+    /// Middle of the symbol.
+    pub at: Pos2,
+    /// On a pipe that runs down.
+    pub vertical: bool,
+    /// Angle in degrees.
+    pub angle_deg: f64,
+    /// Its stream.
+    pub stream: StreamView,
+}
+
+/// A pump as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PumpView {
+    /// Tag.
+    pub tag: String,
+    /// Middle of the symbol.
+    pub at: Pos2,
+    /// Input in its unit.
+    pub input: f64,
+    /// The unit's symbol.
+    pub unit: &'static str,
+    /// Its tank is empty.
+    pub dry: bool,
+    /// Water drawn in.
+    pub suction: StreamView,
+    /// Water on its way to the tank.
+    pub discharge: StreamView,
+    /// It can be set by hand: no loop in automatic writes it.
+    pub by_hand: bool,
+}
+
+/// An instrument as drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BubbleView {
+    /// Tag.
+    pub tag: String,
+    /// Middle of the bubble.
+    pub at: Pos2,
+    /// Its signal is not to be trusted.
+    pub abnormal: bool,
+    /// Manual (`Some(false)`), automatic (`Some(true)`), or no controller.
+    pub automatic: Option<bool>,
+}
+
+/// The drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PidModel {
+    /// Tanks.
+    pub tanks: Vec<TankView>,
+    /// Valves with their streams.
+    pub valves: Vec<ValveView>,
+    /// Pumps with their streams.
+    pub pumps: Vec<PumpView>,
+    /// Sensors, then controllers.
+    pub bubbles: Vec<BubbleView>,
+    /// Signal lines of the loops in operation.
+    pub signals: Vec<Vec<Pos2>>,
+    /// Pixels per grid unit.
+    pub scale: f32,
+}
+
+impl PidModel {
+    /// Lays the snapshot out in a rectangle of the screen.
+    #[must_use]
+    pub fn new(snapshot: &Snapshot, layout: &Layout, rect: Rect) -> Self {
+        let frame = Frame::new(layout, rect);
+        let tanks: Vec<TankView> = (0..snapshot.tanks.len()).map(|i| tank(snapshot, layout, &frame, i)).collect();
+        let stream = |route: &Route, flow: f64| StreamView {
+            pipe: route.pipe.iter().map(|p| frame.point(*p)).collect(),
+            flow_cm3_s: flow,
+            falls_to: route.falls_into.and_then(|t| {
+                let x = frame.point(*route.pipe.last()?).x;
+                Some(pos2(x, tanks[t].surface_y))
+            }),
+            to_outside: route.to_outside,
+        };
+        let spec = &snapshot.network.spec;
+        let valves = (0..snapshot.valves.len())
+            .map(|i| ValveView {
+                tag: spec.valves[i].id.clone(),
+                at: frame.point(layout.valves[i].at),
+                vertical: layout.valves[i].vertical,
+                angle_deg: snapshot.valves[i].angle_deg,
+                stream: stream(&layout.valve_routes[i], snapshot.valves[i].flow_cm3_s),
+            })
+            .collect();
+        let pumps = (0..snapshot.pumps.len())
+            .map(|i| {
+                let now = &snapshot.pumps[i];
+                let suction = Route { pipe: layout.suctions[i].clone(), falls_into: None, to_outside: false };
+                let automatic = snapshot.loops.iter().any(|l| l.pump == i && l.mode == Mode::Automatic);
+                PumpView {
+                    tag: spec.pumps[i].id.clone(),
+                    at: frame.point(layout.pumps[i]),
+                    input: now.input,
+                    unit: spec.pumps[i].unit.symbol(),
+                    dry: now.dry,
+                    suction: stream(&suction, now.pumped_cm3_s),
+                    discharge: stream(&layout.discharges[i], now.arriving_cm3_s),
+                    by_hand: !automatic,
+                }
+            })
+            .collect();
+        let (bubbles, signals) = instruments(snapshot, layout, &frame);
+        Self { tanks, valves, pumps, bubbles, signals, scale: frame.scale() }
+    }
+}
+
+fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankView {
+    let rect = frame.rect(layout.tanks[i]);
+    let now = &snapshot.tanks[i];
+    let height_cm = snapshot.network.tanks[i].height_cm;
+    let share = (now.level_cm / height_cm).clamp(0.0, 1.0) as f32;
+    let side = layout.spill_side[i];
+    let x = if side < 0.0 { rect.left() - 5.0 } else { rect.right() + 5.0 };
+    let bottom = match snapshot.network.tanks[i].spills_to {
+        Some(to) => frame.rect(layout.tanks[to]).top(),
+        None => rect.bottom() + 14.0,
+    };
+    let loops = snapshot.loops.iter().filter(|l| l.mode == Mode::Automatic);
+    let held = loops.into_iter().find(|l| snapshot.network.sensors[l.sensor].tank == i);
+    TankView {
+        tag: snapshot.network.spec.tanks[i].id.clone(),
+        surface_y: rect.bottom() - share * rect.height(),
+        rect,
+        level_cm: now.level_cm,
+        height_cm,
+        spill_cm3_s: now.spill_cm3_s,
+        spill: [pos2(x, rect.top()), pos2(x, bottom)],
+        setpoint_cm: held.map(|l| l.setpoint_cm),
+    }
+}
+
+fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<BubbleView>, Vec<Vec<Pos2>>) {
+    let spec = &snapshot.network.spec;
+    let mut bubbles: Vec<BubbleView> = (0..spec.sensors.len())
+        .map(|i| {
+            let now = snapshot.loops.iter().find(|l| l.sensor == i);
+            let alarmed = snapshot.alarms.iter().any(|a| {
+                matches!(a, Alarm::SensorFault { .. } | Alarm::AboveRange { .. } | Alarm::BelowRange { .. })
+                    && a.tag() == spec.sensors[i].id
+            });
+            BubbleView {
+                tag: spec.sensors[i].id.clone(),
+                at: frame.point(layout.sensors[i]),
+                abnormal: alarmed || now.is_some_and(|l| l.status == ReadingStatus::Broken),
+                automatic: None,
+            }
+        })
+        .collect();
+    let mut signals = vec![];
+    for now in &snapshot.loops {
+        let (sensor, controller) = (layout.sensors[now.sensor], layout.controllers[now.pump]);
+        let pump = layout.pumps[now.pump];
+        bubbles.push(BubbleView {
+            tag: now.tag.clone(),
+            at: frame.point(controller),
+            abnormal: false,
+            automatic: Some(now.mode == Mode::Automatic),
+        });
+        let tank = layout.tanks[snapshot.network.sensors[now.sensor].tank];
+        let wall = pos2(tank.right(), sensor.y);
+        let down = snapshot.network.pumps[now.pump].from.is_some();
+        let corner = if down { pos2(controller.x, pump.y - 0.06) } else { pos2(controller.x, pump.y - 0.14) };
+        let end = if down { pos2(pump.x, corner.y) } else { pos2(pump.x, corner.y) };
+        let mut line = vec![wall, sensor];
+        if sensor.x != controller.x && sensor.y != controller.y {
+            line.push(pos2(controller.x, sensor.y));
+        }
+        line.extend([controller, corner, end]);
+        if !down {
+            line.push(pump);
+        }
+        signals.push(line.into_iter().map(|p| frame.point(p)).collect());
+    }
+    (bubbles, signals)
+}

@@ -1,0 +1,7 @@
+//! Small controls that several panes share.
+
+mod icon;
+mod segmented;
+
+pub use icon::{Icon, icon_button};
+pub use segmented::segmented;

@@ -1,0 +1,278 @@
+//! The window: state, what happens between frames ([`Workbench::logic`]), and the frame ([`Workbench::ui`]).
+
+mod dispatch;
+mod files;
+mod jobs;
+mod settings;
+mod tiles;
+mod topbar;
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use eframe::egui;
+use vasos_engine::document::{Document, History, SourceChoice};
+use vasos_engine::session::{Rig, Session, SessionCommand};
+use vasos_io::rig::PRESETS;
+
+use crate::action::Action;
+use crate::i18n;
+use crate::journal::{self, Entry, Weight};
+use crate::panes::{PaneKind, States, View};
+use crate::traces::{LogTrace, RunTrace};
+use crate::tuning::TuningTable;
+pub use settings::Settings;
+
+use self::files::ImportSheet;
+use self::jobs::Jobs;
+
+/// How a workbench starts.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// A log or a rig to open.
+    pub file: Option<PathBuf>,
+    /// Stand still at time 0, for tests and screenshots.
+    pub paused: bool,
+    /// Neither read nor write settings.
+    pub forget: bool,
+}
+
+/// The window's state.
+pub struct Workbench {
+    session: Session,
+    history: History,
+    run: RunTrace,
+    kept: Option<RunTrace>,
+    log: Option<LogTrace>,
+    tuning: TuningTable,
+    journal: VecDeque<Entry>,
+    tree: egui_tiles::Tree<PaneKind>,
+    maximised: Option<PaneKind>,
+    states: States,
+    settings: Settings,
+    jobs: Jobs,
+    import: Option<ImportSheet>,
+    recording: Option<vasos_io::recording::Recording>,
+    path_field: Option<String>,
+    options: Options,
+    title: String,
+}
+
+impl Workbench {
+    /// A workbench on the reference rig, running unless told otherwise.
+    ///
+    /// # Errors
+    /// When the preset cannot start.
+    pub fn new(ctx: &egui::Context, options: Options) -> anyhow::Result<Self> {
+        crate::theme::install(ctx);
+        let settings = if options.forget { Settings::default() } else { Settings::load() };
+        i18n::set(settings.language);
+        ctx.set_theme(settings.theme());
+        ctx.set_zoom_factor(settings.zoom());
+        let preset = PRESETS.iter().find(|p| Some(p.id) == settings.rig.as_deref()).unwrap_or(&PRESETS[0]);
+        let network = vasos_io::rig::preset(preset.id)?;
+        let document = Document::new(network);
+        let rig = Rig {
+            network: document.rig.network.clone(),
+            configuration: document.rig.configuration,
+            measurement: document.rig.measurement,
+            seed: document.rig.seed,
+        };
+        let repaint = ctx.clone();
+        let session = Session::start(&rig, Box::new(move || repaint.request_repaint()))?;
+        let tree = settings.layout.clone().unwrap_or_else(tiles::first_layout);
+        let mut workbench = Self {
+            session,
+            history: History::new(document),
+            run: RunTrace::default(),
+            kept: None,
+            log: None,
+            tuning: TuningTable::default(),
+            journal: VecDeque::new(),
+            tree,
+            maximised: None,
+            states: States::default(),
+            jobs: Jobs::new(ctx.clone()),
+            import: None,
+            recording: None,
+            path_field: None,
+            settings,
+            title: String::new(),
+            options,
+        };
+        if !workbench.options.paused {
+            workbench.session_command(SessionCommand::Run);
+            if workbench.settings.record_always {
+                workbench.act(ctx, Action::ToggleRecording);
+            }
+        }
+        if let Some(path) = workbench.options.file.take() {
+            workbench.act(ctx, Action::OpenFile(path));
+        }
+        Ok(workbench)
+    }
+
+    /// The document.
+    #[must_use]
+    pub fn document(&self) -> &Document {
+        self.history.document()
+    }
+
+    /// The rig now.
+    #[must_use]
+    pub fn snapshot(&self) -> std::sync::Arc<vasos_engine::session::Snapshot> {
+        self.session.snapshot()
+    }
+
+    /// What happened, newest last.
+    #[must_use]
+    pub fn journal(&self) -> &VecDeque<Entry> {
+        &self.journal
+    }
+
+    /// The present run's samples.
+    #[must_use]
+    pub fn run(&self) -> &RunTrace {
+        &self.run
+    }
+
+    /// Whether a fit or an import is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.jobs.is_busy()
+    }
+
+    /// Between frames: fetches samples and events, takes results of jobs, keeps tables up to date. It also runs
+    /// while the window is covered.
+    pub fn logic(&mut self, ctx: &egui::Context) {
+        i18n::set(self.settings.language);
+        for block in self.session.samples() {
+            self.run.take(&block);
+        }
+        let events: Vec<_> = self.session.events().collect();
+        for event in events {
+            self.run.note(&event);
+            journal::add(&mut self.journal, journal::of_event(&event));
+        }
+        self.take_results(ctx);
+        self.tuning.update(self.history.document());
+        if let Some(recording) = &mut self.recording {
+            for trouble in recording.troubles() {
+                journal::add(&mut self.journal, journal::entry(Weight::Alarm, i18n::say(&trouble)));
+            }
+        }
+        self.take_dropped(ctx);
+        self.set_title(ctx);
+    }
+
+    /// One frame.
+    pub fn ui(&mut self, ui: &mut egui::Ui) {
+        let snapshot = self.session.snapshot();
+        let document = self.history.document().clone();
+        let mut actions = self.keys(ui);
+        actions.extend(self.top_bar(ui, &snapshot, &document));
+        actions.extend(self.status_bar(ui, &snapshot, &document));
+        let view = View {
+            snapshot: &snapshot,
+            document: &document,
+            run: &self.run,
+            kept: self.kept.as_ref(),
+            log: self.log.as_ref(),
+            tuning: &self.tuning,
+            fitting: self.jobs.is_busy(),
+            journal: &self.journal,
+        };
+        egui::CentralPanel::default_margins()
+            .frame(egui::Frame::NONE.fill(crate::theme::palette(ui).field).inner_margin(6))
+            .show(ui, |ui| {
+                actions.extend(tiles::ui(ui, &mut self.tree, self.maximised, &view, &mut self.states));
+            });
+        if let Some(sheet) = &mut self.import {
+            actions.extend(files::import_ui(ui, sheet));
+        }
+        self.path_ui(ui, &mut actions);
+        let ctx = ui.ctx().clone();
+        for action in actions {
+            self.act(&ctx, action);
+        }
+        if snapshot.running {
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
+        }
+    }
+
+    fn keys(&self, ui: &egui::Ui) -> Vec<Action> {
+        if ui.ctx().egui_wants_keyboard_input() {
+            return vec![];
+        }
+        use egui::{Key, KeyboardShortcut, Modifiers};
+        let keys = [
+            (KeyboardShortcut::new(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z), Action::Redo),
+            (KeyboardShortcut::new(Modifiers::COMMAND, Key::Y), Action::Redo),
+            (KeyboardShortcut::new(Modifiers::COMMAND, Key::Z), Action::Undo),
+            (KeyboardShortcut::new(Modifiers::COMMAND, Key::O), Action::AskFile),
+            (KeyboardShortcut::new(Modifiers::COMMAND, Key::R), Action::ToggleRecording),
+            (KeyboardShortcut::new(Modifiers::COMMAND, Key::I), Action::Identify),
+        ];
+        let mut actions: Vec<Action> = ui.input_mut(|i| {
+            keys.into_iter().filter(|(key, _)| i.consume_shortcut(key)).map(|(_, action)| action).collect()
+        });
+        // A focused button takes the space bar itself.
+        if ui.memory(|m| m.focused()).is_none() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Space)) {
+            actions.push(Action::ToggleRunning);
+        }
+        actions
+    }
+
+    fn set_title(&mut self, ctx: &egui::Context) {
+        let document = self.history.document();
+        let shown = match (document.source, &document.log) {
+            (SourceChoice::Log, Some(log)) => log.name.clone(),
+            _ => document.rig.network.spec.title.get(i18n::current().tag()).to_owned(),
+        };
+        let title = format!("Vasos · {shown}");
+        if title != self.title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
+    }
+
+    pub(crate) fn session_command(&mut self, command: SessionCommand) {
+        if !self.session.send(command) {
+            journal::add(&mut self.journal, journal::entry(Weight::Alarm, crate::tr!("event.busy")));
+        }
+    }
+
+    /// Writes the settings; called at exit and after changes that must outlive a crash.
+    pub fn save_settings(&mut self) {
+        if self.options.forget {
+            return;
+        }
+        self.settings.layout = Some(self.tree.clone());
+        self.settings.rig = Some(self.history.document().rig.network.spec.id.clone());
+        if let Err(error) = self.settings.save() {
+            journal::add(&mut self.journal, journal::entry(Weight::Caution, i18n::say(&error)));
+        }
+    }
+}
+
+impl eframe::App for Workbench {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.logic(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.ui(ui);
+    }
+
+    fn save(&mut self, _storage: &mut dyn eframe::Storage) {
+        self.save_settings();
+    }
+
+    fn on_exit(&mut self, _gl: Option<&eframe::glow::Context>) {
+        self.save_settings();
+        if let Some(recording) = self.recording.take() {
+            self.session_command(SessionCommand::Detach { id: recording.id() });
+            recording.close();
+        }
+    }
+}

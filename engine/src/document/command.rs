@@ -1,0 +1,291 @@
+//! Changes of the document.
+
+use std::sync::Arc;
+
+use super::data::{
+    Candidate, Document, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings, SourceChoice, Stretch,
+};
+use crate::control::{GainsError, Mode, PidTuning, check_filter};
+use crate::explain::{Explain, number};
+use crate::identify::FopdtFit;
+use crate::model::ProcessModel;
+use crate::plant::{Measurement, Network, RigError};
+use crate::session::CommandError;
+use crate::signal::LogTable;
+
+/// A change of the document.
+#[derive(Debug, Clone)]
+pub enum DocumentCommand {
+    /// Another rig, as its file has it.
+    OpenRig(Arc<Network>),
+    /// Another configuration of the rig.
+    Configuration(usize),
+    /// Setpoint of a loop in cm.
+    Setpoint(String, f64),
+    /// Mode of a loop.
+    Mode(String, Mode),
+    /// Tuning of a loop.
+    Tuning(String, PidTuning),
+    /// PV filter of a loop in seconds.
+    PvFilter(String, f64),
+    /// Tuning and PV filter of a loop together, as one step of the history.
+    ApplyTuning(String, PidTuning, f64),
+    /// Angle of a valve in degrees.
+    Angle(String, f64),
+    /// Imperfections of the simulated rig.
+    Measurement(Measurement),
+    /// Seed of the noise.
+    Seed(u64),
+    /// A log was imported, with the columns proposed.
+    OpenLog(Arc<LogTable>, LogRoles),
+    /// Columns of the log.
+    Roles(LogRoles),
+    /// Data in use.
+    Source(SourceChoice),
+    /// Stretch for identification.
+    Stretch(Option<Stretch>),
+    /// A model was fitted or typed; it becomes the one in use.
+    AddModel(Box<NewModel>),
+    /// Another model of the list.
+    UseModel(u32),
+    /// A model is struck off the list.
+    RemoveModel(u32),
+    /// A tuning to look at.
+    Candidate(Option<Candidate>),
+    /// Free time constant of a rule in seconds; `None` for its default.
+    TauC(String, Option<f64>),
+}
+
+/// A model that joins the list.
+#[derive(Debug, Clone)]
+pub struct NewModel {
+    /// The model.
+    pub model: ProcessModel,
+    /// Where it comes from.
+    pub origin: ModelOrigin,
+    /// The fit that gave it.
+    pub fit: Option<Arc<FopdtFit>>,
+    /// Unit of its PV.
+    pub pv_unit: String,
+    /// Unit of its MV.
+    pub mv_unit: String,
+}
+
+/// Why the document stays as it is.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DocumentError {
+    /// The rig could not take it.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+    /// PV and MV on one column.
+    #[error("PV and MV cannot be the same column; choose another one for either")]
+    SameColumn,
+    /// A stretch without length.
+    #[error("a stretch from {} s to {} s is empty; drag over a part of the trend", number(*.from_s), number(*.to_s))]
+    EmptyStretch {
+        /// Start in seconds.
+        from_s: f64,
+        /// End in seconds.
+        to_s: f64,
+    },
+    /// A free time constant that is not positive.
+    #[error("τc = {} s is not usable: it must be greater than 0", number(*.value))]
+    TauC {
+        /// Offending value in seconds.
+        value: f64,
+    },
+}
+
+impl Explain for DocumentError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Command(error) => error.key(),
+            Self::SameColumn => "document.same_column",
+            Self::EmptyStretch { .. } => "document.empty_stretch",
+            Self::TauC { .. } => "document.tau_c",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Command(error) => error.args(),
+            Self::SameColumn => vec![],
+            Self::EmptyStretch { from_s, to_s } => vec![("from_s", number(*from_s)), ("to_s", number(*to_s))],
+            Self::TauC { value } => vec![("value", number(*value))],
+        }
+    }
+}
+
+impl DocumentError {
+    /// One of each kind of its own, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        vec![Self::SameColumn, Self::EmptyStretch { from_s: 5.0, to_s: 5.0 }, Self::TauC { value: -1.0 }]
+    }
+}
+
+impl DocumentCommand {
+    /// Key under `change.` in the translation files, for the history.
+    #[must_use]
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::OpenRig(_) => "open_rig",
+            Self::Configuration(_) => "configuration",
+            Self::Setpoint(..) => "setpoint",
+            Self::Mode(..) => "mode",
+            Self::Tuning(..) | Self::ApplyTuning(..) => "tuning",
+            Self::PvFilter(..) => "pv_filter",
+            Self::Angle(..) => "angle",
+            Self::Measurement(_) => "measurement",
+            Self::Seed(_) => "seed",
+            Self::OpenLog(..) => "open_log",
+            Self::Roles(_) => "roles",
+            Self::Source(_) => "source",
+            Self::Stretch(_) => "stretch",
+            Self::AddModel(_) => "add_model",
+            Self::UseModel(_) => "use_model",
+            Self::RemoveModel(_) => "remove_model",
+            Self::Candidate(_) => "candidate",
+            Self::TauC(..) => "tau_c",
+        }
+    }
+
+    /// Changes that follow each other with the same thread become one step of the history.
+    #[must_use]
+    pub fn thread(&self) -> Option<String> {
+        match self {
+            Self::Setpoint(tag, _)
+            | Self::Angle(tag, _)
+            | Self::TauC(tag, _)
+            | Self::Tuning(tag, _)
+            | Self::PvFilter(tag, _) => Some(format!("{} {tag}", self.key())),
+            Self::Stretch(_) | Self::Candidate(_) => Some(self.key().to_owned()),
+            _ => None,
+        }
+    }
+}
+
+impl Document {
+    /// The document after a change.
+    ///
+    /// # Errors
+    /// [`DocumentError`]; the document is as before.
+    pub fn after(&self, command: &DocumentCommand) -> Result<Self, DocumentError> {
+        let mut next = self.clone();
+        match command {
+            DocumentCommand::OpenRig(network) => next.rig = RigSettings::new(network.clone()),
+            DocumentCommand::Configuration(index) => {
+                if *index >= self.rig.network.spec.configurations.len() {
+                    return Err(CommandError::UnknownTag { tag: index.to_string() }.into());
+                }
+                next.rig.configure(*index);
+            }
+            DocumentCommand::Setpoint(tag, level_cm) => {
+                next.check_setpoint(tag, *level_cm)?;
+                next.settings(tag)?.setpoint_cm = *level_cm;
+            }
+            DocumentCommand::Mode(tag, mode) => next.settings(tag)?.mode = *mode,
+            DocumentCommand::Tuning(tag, tuning) => {
+                next.settings(tag)?.tuning = tuning.validated().map_err(CommandError::from)?;
+            }
+            DocumentCommand::PvFilter(tag, filter_s) => {
+                next.settings(tag)?.pv_filter_s = check_filter(*filter_s).map_err(CommandError::from)?;
+            }
+            DocumentCommand::ApplyTuning(tag, tuning, filter_s) => {
+                let usable = |e: GainsError| CommandError::from(e);
+                let settings = next.settings(tag)?;
+                settings.tuning = tuning.validated().map_err(usable)?;
+                settings.pv_filter_s = check_filter(*filter_s).map_err(usable)?;
+            }
+            DocumentCommand::Angle(tag, angle_deg) => next.turn(tag, *angle_deg)?,
+            DocumentCommand::Measurement(measurement) => next.rig.measurement = *measurement,
+            DocumentCommand::Seed(seed) => next.rig.seed = *seed,
+            DocumentCommand::OpenLog(log, roles) => {
+                next.log = Some(log.clone());
+                next.roles = *roles;
+                next.source = SourceChoice::Log;
+                next.stretch = None;
+            }
+            DocumentCommand::Roles(roles) => {
+                if roles.pv.is_some() && roles.pv == roles.mv {
+                    return Err(DocumentError::SameColumn);
+                }
+                next.roles = *roles;
+            }
+            DocumentCommand::Source(source) => {
+                next.source = *source;
+                next.stretch = None;
+            }
+            DocumentCommand::Stretch(stretch) => {
+                if let Some(Stretch { from_s, to_s }) = *stretch {
+                    if !from_s.is_finite() || !to_s.is_finite() || to_s <= from_s {
+                        return Err(DocumentError::EmptyStretch { from_s, to_s });
+                    }
+                }
+                next.stretch = *stretch;
+            }
+            DocumentCommand::AddModel(new) => next.add_model(new),
+            DocumentCommand::UseModel(number) => {
+                if next.models.iter().any(|m| m.number == *number) {
+                    next.model_in_use = Some(*number);
+                }
+            }
+            DocumentCommand::RemoveModel(number) => {
+                next.models.retain(|m| m.number != *number);
+                if next.model_in_use == Some(*number) {
+                    next.model_in_use = next.models.last().map(|m| m.number);
+                }
+            }
+            DocumentCommand::Candidate(candidate) => next.candidate.clone_from(candidate),
+            DocumentCommand::TauC(rule, Some(value)) => {
+                if !(value.is_finite() && *value > 0.0) {
+                    return Err(DocumentError::TauC { value: *value });
+                }
+                next.tau_c_s.insert(rule.clone(), *value);
+            }
+            DocumentCommand::TauC(rule, None) => {
+                next.tau_c_s.remove(rule);
+            }
+        }
+        Ok(next)
+    }
+
+    fn settings(&mut self, tag: &str) -> Result<&mut LoopSettings, DocumentError> {
+        let unknown = || CommandError::UnknownTag { tag: tag.to_owned() };
+        self.rig.loops.get_mut(tag).ok_or_else(|| unknown().into())
+    }
+
+    fn check_setpoint(&self, tag: &str, level_cm: f64) -> Result<(), DocumentError> {
+        let network = &self.rig.network;
+        let loops = network.spec.configurations.iter().flat_map(|c| &c.loops);
+        let Some(sensor) = loops.into_iter().find(|l| l.id == tag).and_then(|l| network.sensor(&l.sensor)) else {
+            return Err(CommandError::UnknownTag { tag: tag.to_owned() }.into());
+        };
+        let rim_cm = network.tanks[network.sensors[sensor].tank].height_cm;
+        if (0.0..=rim_cm).contains(&level_cm) {
+            Ok(())
+        } else {
+            Err(CommandError::Setpoint { tag: tag.to_owned(), level_cm, rim_cm }.into())
+        }
+    }
+
+    fn turn(&mut self, tag: &str, angle_deg: f64) -> Result<(), DocumentError> {
+        let valve = self.rig.network.valve(tag);
+        let valve = valve.ok_or_else(|| CommandError::UnknownTag { tag: tag.to_owned() })?;
+        if !(0.0..=90.0).contains(&angle_deg) {
+            let (item, expected) = (tag.to_owned(), "0…90".to_owned());
+            let error = RigError::Value { item, field: "angle_deg", value: angle_deg, expected };
+            return Err(CommandError::from(error).into());
+        }
+        self.rig.angles_deg[valve] = angle_deg;
+        Ok(())
+    }
+
+    fn add_model(&mut self, new: &NewModel) {
+        let number = self.models.iter().map(|m| m.number).max().unwrap_or(0) + 1;
+        let NewModel { model, origin, fit, pv_unit, mv_unit } = new.clone();
+        self.models.push(ModelEntry { number, model, origin, fit, pv_unit, mv_unit });
+        self.model_in_use = Some(number);
+        self.candidate = None;
+    }
+}

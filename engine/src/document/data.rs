@@ -1,0 +1,226 @@
+//! The document's data.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::control::{LoopSpec, Mode, PidGains, PidTuning};
+use crate::identify::FopdtFit;
+use crate::model::ProcessModel;
+use crate::plant::{Measurement, Network};
+use crate::signal::LogTable;
+
+/// Settings of one loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopSettings {
+    /// Setpoint in cm.
+    pub setpoint_cm: f64,
+    /// Who writes the output.
+    pub mode: Mode,
+    /// Gains and weights.
+    pub tuning: PidTuning,
+    /// Time constant of the PV filter in seconds.
+    pub pv_filter_s: f64,
+}
+
+impl LoopSettings {
+    /// As the rig file has them.
+    #[must_use]
+    pub fn of(spec: &LoopSpec) -> Self {
+        Self {
+            setpoint_cm: spec.setpoint_cm,
+            mode: spec.mode,
+            tuning: spec.tuning(),
+            pv_filter_s: spec.pv_filter_s,
+        }
+    }
+}
+
+/// The rig and how it is set.
+#[derive(Debug, Clone)]
+pub struct RigSettings {
+    /// Its structure.
+    pub network: Arc<Network>,
+    /// Index of the configuration.
+    pub configuration: usize,
+    /// Angles of the valves in degrees, in the order of the network.
+    pub angles_deg: Vec<f64>,
+    /// Settings of every loop of every configuration, by tag.
+    pub loops: BTreeMap<String, LoopSettings>,
+    /// Imperfections.
+    pub measurement: Measurement,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl RigSettings {
+    /// A rig as its file has it.
+    #[must_use]
+    pub fn new(network: Arc<Network>) -> Self {
+        let spec = &network.spec;
+        let loops = spec.configurations.iter().flat_map(|c| &c.loops);
+        let mut settings = Self {
+            configuration: 0,
+            angles_deg: spec.valves.iter().map(|v| v.angle_deg).collect(),
+            loops: loops.map(|l| (l.id.clone(), LoopSettings::of(l))).collect(),
+            measurement: Measurement::DEFAULT,
+            seed: 1,
+            network,
+        };
+        settings.turn_valves();
+        settings
+    }
+
+    /// Puts the angles to those of the present configuration.
+    pub(super) fn turn_valves(&mut self) {
+        let Some(configuration) = self.network.spec.configurations.get(self.configuration) else { return };
+        for (id, &angle_deg) in &configuration.angles_deg {
+            if let Some(valve) = self.network.valve(id) {
+                self.angles_deg[valve] = angle_deg;
+            }
+        }
+    }
+
+    /// Turns to a configuration; the operator's mode goes along.
+    pub(super) fn configure(&mut self, configuration: usize) {
+        let mode = self.active_loops().first().and_then(|l| self.loops.get(&l.id)).map(|l| l.mode);
+        self.configuration = configuration;
+        self.turn_valves();
+        let tags: Vec<String> = self.active_loops().iter().map(|l| l.id.clone()).collect();
+        for tag in tags {
+            if let (Some(mode), Some(settings)) = (mode, self.loops.get_mut(&tag)) {
+                settings.mode = mode;
+            }
+        }
+    }
+
+    /// Loops of the present configuration, as the rig file lists them.
+    #[must_use]
+    pub fn active_loops(&self) -> &[LoopSpec] {
+        self.network.spec.configurations.get(self.configuration).map_or(&[], |c| &c.loops)
+    }
+}
+
+/// Where trend and identification take their data from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SourceChoice {
+    /// The simulated rig's run.
+    Simulated,
+    /// The imported log.
+    Log,
+}
+
+/// Which columns of a log are what; indices into its columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LogRoles {
+    /// Process variable.
+    pub pv: Option<usize>,
+    /// Setpoint.
+    pub sp: Option<usize>,
+    /// Manipulated variable.
+    pub mv: Option<usize>,
+}
+
+/// A stretch of time in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// First time.
+    pub from_s: f64,
+    /// Last time.
+    pub to_s: f64,
+}
+
+/// Where a model comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelOrigin {
+    /// Typed in.
+    Typed,
+    /// Fitted to a stretch of the simulated run.
+    Run {
+        /// Loop whose data it was.
+        tag: String,
+        /// The stretch.
+        stretch: Stretch,
+    },
+    /// Fitted to a stretch of a log.
+    Log {
+        /// File name.
+        name: String,
+        /// The stretch.
+        stretch: Stretch,
+    },
+}
+
+/// A model of the list.
+#[derive(Debug, Clone)]
+pub struct ModelEntry {
+    /// Number shown to people; it is not used again.
+    pub number: u32,
+    /// The model.
+    pub model: ProcessModel,
+    /// Where it comes from.
+    pub origin: ModelOrigin,
+    /// The fit that gave it.
+    pub fit: Option<Arc<FopdtFit>>,
+    /// Unit of its PV, as shown.
+    pub pv_unit: String,
+    /// Unit of its MV, as shown.
+    pub mv_unit: String,
+}
+
+/// A tuning chosen to be looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Id of the rule, or `present`.
+    pub rule: String,
+    /// Short name of the controller: `P`, `PI`, `PD`, `PID`.
+    pub controller: String,
+    /// Gains.
+    pub gains: PidGains,
+}
+
+/// Everything the user works on.
+#[derive(Debug, Clone)]
+pub struct Document {
+    /// The rig.
+    pub rig: RigSettings,
+    /// The imported log.
+    pub log: Option<Arc<LogTable>>,
+    /// Its columns' roles.
+    pub roles: LogRoles,
+    /// Data in use.
+    pub source: SourceChoice,
+    /// Stretch chosen for identification.
+    pub stretch: Option<Stretch>,
+    /// Models, oldest first.
+    pub models: Vec<ModelEntry>,
+    /// Number of the model in use.
+    pub model_in_use: Option<u32>,
+    /// Tuning in view.
+    pub candidate: Option<Candidate>,
+    /// Free time constants by rule, in seconds; absent: the rule's default.
+    pub tau_c_s: BTreeMap<String, f64>,
+}
+
+impl Document {
+    /// A fresh document on a rig.
+    #[must_use]
+    pub fn new(network: Arc<Network>) -> Self {
+        Self {
+            rig: RigSettings::new(network),
+            log: None,
+            roles: LogRoles::default(),
+            source: SourceChoice::Simulated,
+            stretch: None,
+            models: vec![],
+            model_in_use: None,
+            candidate: None,
+            tau_c_s: BTreeMap::new(),
+        }
+    }
+
+    /// The model in use.
+    #[must_use]
+    pub fn model(&self) -> Option<&ModelEntry> {
+        self.models.iter().find(|m| Some(m.number) == self.model_in_use)
+    }
+}

@@ -1,0 +1,15 @@
+//! What the user works on: rig settings, log, models, choices. Plain data, changed only by commands, so that
+//! every change can be undone and the same commands serve window, tests and later the project file.
+//!
+//! A [`Document`] is small and its bulky parts are shared, so history keeps whole versions. What a change means
+//! for the running rig is the difference of two versions, [`rig_commands`].
+
+mod command;
+mod data;
+mod history;
+mod sync;
+
+pub use command::{DocumentCommand, DocumentError};
+pub use data::{Candidate, Document, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings, SourceChoice, Stretch};
+pub use history::History;
+pub use sync::{Consequence, rig_commands};

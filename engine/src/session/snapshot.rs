@@ -1,0 +1,125 @@
+//! The present state of a session, complete and immutable: the latest replaces the one before.
+
+use std::sync::Arc;
+
+use super::event::Alarm;
+use crate::control::{Mode, PidTuning};
+use crate::plant::{Balance, Measurement, Network, ReadingStatus};
+
+/// A tank now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TankNow {
+    /// True level in cm.
+    pub level_cm: f64,
+    /// Spill over the rim in cm³/s.
+    pub spill_cm3_s: f64,
+}
+
+/// A pump now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PumpNow {
+    /// Input in its unit.
+    pub input: f64,
+    /// Flow it draws, in cm³/s.
+    pub pumped_cm3_s: f64,
+    /// Flow that arrives, in cm³/s.
+    pub arriving_cm3_s: f64,
+    /// It draws from an empty tank.
+    pub dry: bool,
+}
+
+/// A valve now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValveNow {
+    /// Angle in degrees.
+    pub angle_deg: f64,
+    /// Flow in cm³/s, positive from its `from` to its `to`.
+    pub flow_cm3_s: f64,
+}
+
+/// A loop now.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopNow {
+    /// Tag.
+    pub tag: String,
+    /// Sensor's index in the network.
+    pub sensor: usize,
+    /// Pump's index in the network.
+    pub pump: usize,
+    /// Measured PV in cm; NaN before the first sample.
+    pub pv_cm: f64,
+    /// What the reading is worth.
+    pub status: ReadingStatus,
+    /// Setpoint in cm.
+    pub setpoint_cm: f64,
+    /// Output in the pump's unit.
+    pub mv: f64,
+    /// Who writes it.
+    pub mode: Mode,
+    /// Gains and weights in use.
+    pub tuning: PidTuning,
+    /// Time constant of the PV filter in seconds.
+    pub pv_filter_s: f64,
+}
+
+/// Everything a view needs of the present.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    /// Number of the run; grows when a rig is loaded or restarted.
+    pub run: u64,
+    /// Time of the run in seconds.
+    pub time_s: f64,
+    /// Samples taken in the run.
+    pub samples: u64,
+    /// Time goes on.
+    pub running: bool,
+    /// Wanted times real time.
+    pub speed: f64,
+    /// Reached times real time, over the last second; NaN while paused.
+    pub achieved_speed: f64,
+    /// Structure of the rig.
+    pub network: Arc<Network>,
+    /// Index of the present configuration.
+    pub configuration: usize,
+    /// Imperfections that are on.
+    pub measurement: Measurement,
+    /// Tanks in the order of the network.
+    pub tanks: Vec<TankNow>,
+    /// Pumps in the order of the network.
+    pub pumps: Vec<PumpNow>,
+    /// Valves in the order of the network.
+    pub valves: Vec<ValveNow>,
+    /// Loops of the configuration.
+    pub loops: Vec<LoopNow>,
+    /// Where the water is.
+    pub balance: Balance,
+    /// Water gained or lost by computation since the start, in cm³: 0 but for rounding.
+    pub balance_error_cm3: f64,
+    /// Alarms that are on.
+    pub alarms: Vec<Alarm>,
+}
+
+impl Snapshot {
+    /// A rig of which nothing is known yet.
+    #[must_use]
+    pub fn empty(network: Arc<Network>) -> Self {
+        Self {
+            run: 0,
+            time_s: 0.0,
+            samples: 0,
+            running: false,
+            speed: 1.0,
+            achieved_speed: f64::NAN,
+            network,
+            configuration: 0,
+            measurement: Measurement::DEFAULT,
+            tanks: vec![],
+            pumps: vec![],
+            valves: vec![],
+            loops: vec![],
+            balance: Balance::default(),
+            balance_error_cm3: 0.0,
+            alarms: vec![],
+        }
+    }
+}

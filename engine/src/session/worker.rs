@@ -1,0 +1,381 @@
+//! The session's one thread: the only place where time passes.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError};
+
+use super::alarms::AlarmTable;
+use super::command::CommandError;
+use super::event::{Event, EventKind};
+use super::sink::Sink;
+use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
+use super::{Notify, Rig, SessionCommand};
+use crate::plant::{Measurement, Plant};
+use crate::signal::SampleBlock;
+use crate::sim::ClosedLoop;
+
+/// Between two looks at the clock while time goes on.
+const TICK: Duration = Duration::from_millis(10);
+/// Longest computing between two looks at the commands.
+const BUDGET: Duration = Duration::from_millis(12);
+/// Samples kept for a reader that does not fetch them: an hour and a half at 200 ms and 20 ×.
+const MOST_PENDING: usize = 500_000;
+/// Events kept likewise.
+const MOST_EVENTS: usize = 10_000;
+
+pub(super) struct Worker {
+    closed: ClosedLoop,
+    run: u64,
+    running: bool,
+    speed: f64,
+    owed_s: f64,
+    achieved_speed: f64,
+    baseline_cm3: f64,
+    alarms: AlarmTable,
+    fresh: SampleBlock,
+    pending: SampleBlock,
+    pending_events: Vec<Event>,
+    sinks: Vec<(u64, Box<dyn Sink>)>,
+    commands: Receiver<SessionCommand>,
+    blocks: Sender<SampleBlock>,
+    events: Sender<Event>,
+    latest: Arc<Mutex<Arc<Snapshot>>>,
+    notify: Notify,
+    changed: bool,
+}
+
+/// What the worker shares with its handle.
+pub(super) struct Ports {
+    pub commands: Receiver<SessionCommand>,
+    pub blocks: Sender<SampleBlock>,
+    pub events: Sender<Event>,
+    pub latest: Arc<Mutex<Arc<Snapshot>>>,
+    pub notify: Notify,
+}
+
+impl Worker {
+    pub fn new(closed: ClosedLoop, ports: Ports) -> Self {
+        let empty =
+            SampleBlock { run: 0, channels: closed.channels().clone(), time_s: vec![], values: vec![] };
+        let mut worker = Self {
+            run: 0,
+            running: false,
+            speed: 1.0,
+            owed_s: 0.0,
+            achieved_speed: f64::NAN,
+            baseline_cm3: 0.0,
+            alarms: AlarmTable::new(&closed),
+            fresh: empty.clone(),
+            pending: empty,
+            pending_events: vec![],
+            sinks: vec![],
+            commands: ports.commands,
+            blocks: ports.blocks,
+            events: ports.events,
+            latest: ports.latest,
+            notify: ports.notify,
+            changed: true,
+            closed,
+        };
+        worker.baseline_cm3 = worker.total_cm3();
+        worker.say(EventKind::RigLoaded { id: worker.closed.network().spec.id.clone() });
+        worker
+    }
+
+    /// Runs until told to shut down or until its handle is gone.
+    pub fn run(mut self) {
+        let mut last = Instant::now();
+        let mut measured = (Instant::now(), 0.0);
+        loop {
+            self.deliver();
+            let waiting = self.running || !self.pending.time_s.is_empty() || !self.pending_events.is_empty();
+            let received = if waiting {
+                self.commands.recv_timeout(if self.owed_s >= self.closed.sample_time_s() {
+                    Duration::ZERO
+                } else {
+                    TICK
+                })
+            } else {
+                self.commands.recv().map_err(|_| RecvTimeoutError::Disconnected)
+            };
+            match received {
+                Ok(command) => {
+                    if !self.obey_all(command) {
+                        return;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            let now = Instant::now();
+            let elapsed = (now - last).as_secs_f64().min(0.25);
+            last = now;
+            if self.running {
+                let before_s = self.closed.time_s();
+                self.owed_s += elapsed * self.speed;
+                self.catch_up();
+                measured.1 += self.closed.time_s() - before_s;
+            }
+            let window = measured.0.elapsed().as_secs_f64();
+            if window >= 1.0 {
+                self.achieved_speed = if self.running { measured.1 / window } else { f64::NAN };
+                measured = (Instant::now(), 0.0);
+            }
+        }
+    }
+
+    /// Takes the samples that are due, as many as the budget allows; what is left is given up, which
+    /// shows as an achieved speed below the wanted one.
+    fn catch_up(&mut self) {
+        let start = Instant::now();
+        let sample_time_s = self.closed.sample_time_s();
+        while self.owed_s >= sample_time_s {
+            self.owed_s -= sample_time_s;
+            if !self.sample() {
+                return;
+            }
+            if start.elapsed() > BUDGET {
+                self.owed_s = self.owed_s.min(sample_time_s);
+                return;
+            }
+        }
+    }
+
+    /// One sample; false when a defect stopped the run.
+    fn sample(&mut self) -> bool {
+        let time_s = self.closed.time_s();
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            let row = self.closed.step();
+            self.fresh.time_s.push(time_s);
+            self.fresh.values.extend_from_slice(row);
+        }));
+        self.changed = true;
+        if let Err(panic) = outcome {
+            let reason = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
+            let reason = reason.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+            self.running = false;
+            self.say(EventKind::Stopped { reason });
+            return false;
+        }
+        let mut changes = Vec::new();
+        self.alarms.update(&self.closed, |alarm, on| changes.push((alarm.clone(), on)));
+        for (alarm, on) in changes {
+            self.say(EventKind::Alarm(alarm, on));
+        }
+        true
+    }
+
+    /// Carries out a command and those that wait behind it, as the budget allows; false at shutdown.
+    fn obey_all(&mut self, first: SessionCommand) -> bool {
+        let begun = Instant::now();
+        let mut next = Some(first);
+        while let Some(command) = next {
+            if matches!(command, SessionCommand::Shutdown) {
+                return false;
+            }
+            self.changed = true;
+            self.obey(command);
+            // A flood of commands must not keep time from passing.
+            next = if begun.elapsed() < BUDGET { self.commands.try_recv().ok() } else { None };
+        }
+        true
+    }
+
+    fn obey(&mut self, command: SessionCommand) {
+        match command {
+            SessionCommand::Rig(command) => match self.closed.apply(&command) {
+                Ok(()) => {
+                    if matches!(command, super::RigCommand::SteadyAt { .. }) {
+                        self.baseline_cm3 = self.total_cm3();
+                    }
+                    if matches!(command, super::RigCommand::Configuration { .. }) {
+                        self.alarms = AlarmTable::new(&self.closed);
+                    }
+                    self.say(EventKind::Done(command));
+                }
+                Err(error) => self.say(EventKind::Refused(error)),
+            },
+            SessionCommand::Run => self.set_running(true),
+            SessionCommand::Pause => self.set_running(false),
+            SessionCommand::Step => {
+                self.set_running(false);
+                self.sample();
+            }
+            SessionCommand::Speed(speed) => {
+                if (1.0..=1000.0).contains(&speed) {
+                    self.speed = speed;
+                } else {
+                    self.say(EventKind::Refused(CommandError::Speed { speed }));
+                }
+            }
+            SessionCommand::Load(rig) => self.load(&rig),
+            SessionCommand::Attach { id, mut sink } => {
+                sink.started(self.run, self.closed.network(), self.closed.channels());
+                self.sinks.push((id, sink));
+            }
+            SessionCommand::Detach { id } => {
+                self.hand_to_sinks();
+                self.sinks.retain(|(other, _)| *other != id);
+            }
+            SessionCommand::Shutdown => {}
+        }
+    }
+
+    fn set_running(&mut self, running: bool) {
+        if running != self.running {
+            self.running = running;
+            self.owed_s = 0.0;
+            self.achieved_speed = f64::NAN;
+            self.say(if running { EventKind::Running } else { EventKind::Paused });
+        }
+    }
+
+    fn load(&mut self, rig: &Rig) {
+        match ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed) {
+            Ok(closed) => {
+                self.hand_to_sinks();
+                self.closed = closed;
+                self.run += 1;
+                self.owed_s = 0.0;
+                self.baseline_cm3 = self.total_cm3();
+                self.alarms = AlarmTable::new(&self.closed);
+                let empty = SampleBlock {
+                    run: self.run,
+                    channels: self.closed.channels().clone(),
+                    time_s: vec![],
+                    values: vec![],
+                };
+                self.fresh = empty.clone();
+                self.pending = empty;
+                for (_, sink) in &mut self.sinks {
+                    sink.started(self.run, self.closed.network(), self.closed.channels());
+                }
+                self.say(EventKind::RigLoaded { id: rig.network.spec.id.clone() });
+            }
+            Err(error) => self.say(EventKind::Refused(error)),
+        }
+    }
+
+    fn say(&mut self, kind: EventKind) {
+        let event = Event { run: self.run, time_s: self.closed.time_s(), kind };
+        for (_, sink) in &mut self.sinks {
+            sink.event(&event);
+        }
+        if self.pending_events.len() < MOST_EVENTS {
+            self.pending_events.push(event);
+        }
+        self.changed = true;
+    }
+
+    fn hand_to_sinks(&mut self) {
+        if self.fresh.time_s.is_empty() {
+            return;
+        }
+        for (_, sink) in &mut self.sinks {
+            sink.samples(&self.fresh);
+        }
+        self.pending.time_s.append(&mut self.fresh.time_s);
+        self.pending.values.append(&mut self.fresh.values);
+    }
+
+    /// Hands samples to the sinks, offers them and the events to the reader, publishes the snapshot.
+    fn deliver(&mut self) {
+        self.hand_to_sinks();
+        if !self.pending.time_s.is_empty() {
+            let empty = SampleBlock {
+                run: self.run,
+                channels: self.pending.channels.clone(),
+                time_s: vec![],
+                values: vec![],
+            };
+            match self.blocks.try_send(std::mem::replace(&mut self.pending, empty)) {
+                Ok(()) | Err(TrySendError::Disconnected(_)) => {}
+                Err(TrySendError::Full(back)) => self.pending = back,
+            }
+            let count = self.pending.time_s.len();
+            if count > MOST_PENDING {
+                self.pending.time_s.clear();
+                self.pending.values.clear();
+                self.say(EventKind::SamplesLost { count });
+            }
+        }
+        let mut events = std::mem::take(&mut self.pending_events).into_iter();
+        for event in events.by_ref() {
+            if let Err(TrySendError::Full(event)) = self.events.try_send(event) {
+                self.pending_events.push(event);
+                break;
+            }
+        }
+        self.pending_events.extend(events);
+        if self.changed {
+            self.changed = false;
+            let snapshot = Arc::new(self.snapshot());
+            if let Ok(mut latest) = self.latest.lock() {
+                *latest = snapshot;
+            }
+            (self.notify)();
+        }
+    }
+
+    fn total_cm3(&self) -> f64 {
+        self.closed.source().plant().map_or(0.0, |p| p.balance().total_cm3())
+    }
+
+    pub fn snapshot(&self) -> Snapshot {
+        let closed = &self.closed;
+        let plant = closed.source().plant();
+        let (tanks, pumps, valves) = plant.map_or((vec![], vec![], vec![]), parts);
+        Snapshot {
+            run: self.run,
+            time_s: closed.time_s(),
+            samples: (closed.time_s() / closed.sample_time_s()).round() as u64,
+            running: self.running,
+            speed: self.speed,
+            achieved_speed: self.achieved_speed,
+            network: closed.network().clone(),
+            configuration: closed.configuration(),
+            measurement: closed.measurement().unwrap_or(Measurement::IDEAL),
+            tanks,
+            pumps,
+            valves,
+            loops: closed.loops().iter().map(|l| loop_now(l, closed)).collect(),
+            balance: plant.map(Plant::balance).unwrap_or_default(),
+            balance_error_cm3: self.total_cm3() - self.baseline_cm3,
+            alarms: self.alarms.active(),
+        }
+    }
+}
+
+fn loop_now(l: &crate::sim::ActiveLoop, closed: &ClosedLoop) -> LoopNow {
+    let reading = closed.readings()[l.sensor];
+    LoopNow {
+        tag: l.spec.id.clone(),
+        sensor: l.sensor,
+        pump: l.pump,
+        pv_cm: reading.level_cm,
+        status: reading.status,
+        setpoint_cm: l.control.setpoint_cm,
+        mv: l.control.mv(),
+        mode: l.control.mode,
+        tuning: l.control.tuning(),
+        pv_filter_s: l.control.pv_filter_s(),
+    }
+}
+
+fn parts(plant: &Plant) -> (Vec<TankNow>, Vec<PumpNow>, Vec<ValveNow>) {
+    let tanks = plant.levels_cm().iter().zip(plant.spill_flows_cm3_s());
+    let tanks = tanks.map(|(&level_cm, &spill_cm3_s)| TankNow { level_cm, spill_cm3_s }).collect();
+    let pumps = (0..plant.inputs().len())
+        .map(|i| PumpNow {
+            input: plant.inputs()[i],
+            pumped_cm3_s: plant.pumped_flows_cm3_s()[i],
+            arriving_cm3_s: plant.arriving_flows_cm3_s()[i],
+            dry: plant.dry()[i],
+        })
+        .collect();
+    let valves = plant.angles_deg().iter().zip(plant.valve_flows_cm3_s());
+    let valves = valves.map(|(&angle_deg, &flow_cm3_s)| ValveNow { angle_deg, flow_cm3_s }).collect();
+    (tanks, pumps, valves)
+}
