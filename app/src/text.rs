@@ -41,6 +41,12 @@ pub fn clock(time_s: f64) -> String {
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
 }
 
+/// The moment as `2026-11-22-031500` by the local clock, for file names.
+#[must_use]
+pub fn stamp() -> String {
+    chrono::Local::now().format("%Y-%m-%d-%H%M%S").to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

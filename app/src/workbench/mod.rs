@@ -24,6 +24,8 @@ use crate::tuning::TuningTable;
 pub use settings::Settings;
 
 use self::files::ImportSheet;
+pub use self::files::column_choice;
+pub use self::jobs::Outcome;
 use self::jobs::Jobs;
 
 /// How a workbench starts.
@@ -54,6 +56,7 @@ pub struct Workbench {
     import: Option<ImportSheet>,
     recording: Option<vasos_io::recording::Recording>,
     path_field: Option<String>,
+    notice: Option<String>,
     options: Options,
     title: String,
 }
@@ -65,7 +68,7 @@ impl Workbench {
     /// When the preset cannot start.
     pub fn new(ctx: &egui::Context, options: Options) -> anyhow::Result<Self> {
         crate::theme::install(ctx);
-        let settings = if options.forget { Settings::default() } else { Settings::load() };
+        let (settings, trouble) = if options.forget { (Settings::default(), None) } else { Settings::load() };
         i18n::set(settings.language);
         ctx.set_theme(settings.theme());
         ctx.set_zoom_factor(settings.zoom());
@@ -96,10 +99,14 @@ impl Workbench {
             import: None,
             recording: None,
             path_field: None,
+            notice: None,
             settings,
             title: String::new(),
             options,
         };
+        if let Some(trouble) = trouble {
+            workbench.tell(Weight::Caution, i18n::say(&trouble));
+        }
         if !workbench.options.paused {
             workbench.session_command(SessionCommand::Run);
             if workbench.settings.record_always {
@@ -158,7 +165,8 @@ impl Workbench {
         self.tuning.update(self.history.document());
         if let Some(recording) = &mut self.recording {
             for trouble in recording.troubles() {
-                journal::add(&mut self.journal, journal::entry(Weight::Alarm, i18n::say(&trouble)));
+                let words = i18n::say(&trouble);
+                journal::add(&mut self.journal, journal::entry(Weight::Alarm, words));
             }
         }
         self.take_dropped(ctx);
@@ -187,9 +195,8 @@ impl Workbench {
             .show(ui, |ui| {
                 actions.extend(tiles::ui(ui, &mut self.tree, self.maximised, &view, &mut self.states));
             });
-        if let Some(sheet) = &mut self.import {
-            actions.extend(files::import_ui(ui, sheet));
-        }
+        self.import_ui(ui, &mut actions);
+        self.notice_ui(ui);
         self.path_ui(ui, &mut actions);
         let ctx = ui.ctx().clone();
         for action in actions {
@@ -198,6 +205,11 @@ impl Workbench {
         if snapshot.running {
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
         }
+    }
+
+    /// Writes into the log pane.
+    pub(crate) fn tell(&mut self, weight: Weight, words: String) {
+        journal::add(&mut self.journal, journal::entry(weight, words));
     }
 
     fn keys(&self, ui: &egui::Ui) -> Vec<Action> {
@@ -238,7 +250,7 @@ impl Workbench {
 
     pub(crate) fn session_command(&mut self, command: SessionCommand) {
         if !self.session.send(command) {
-            journal::add(&mut self.journal, journal::entry(Weight::Alarm, crate::tr!("event.busy")));
+            self.tell(Weight::Alarm, crate::tr!("event.busy"));
         }
     }
 
@@ -250,7 +262,7 @@ impl Workbench {
         self.settings.layout = Some(self.tree.clone());
         self.settings.rig = Some(self.history.document().rig.network.spec.id.clone());
         if let Err(error) = self.settings.save() {
-            journal::add(&mut self.journal, journal::entry(Weight::Caution, i18n::say(&error)));
+            self.tell(Weight::Caution, i18n::say(&error));
         }
     }
 }
@@ -272,7 +284,8 @@ impl eframe::App for Workbench {
         self.save_settings();
         if let Some(recording) = self.recording.take() {
             self.session_command(SessionCommand::Detach { id: recording.id() });
-            recording.close();
+            // Nobody is left to tell; the file holds all but its index.
+            drop(recording.close());
         }
     }
 }

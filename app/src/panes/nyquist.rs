@@ -1,0 +1,152 @@
+//! The Nyquist curve of the loop with its Ms and Mt circles, the critical point and the margins.
+
+use eframe::egui::{self, RichText};
+use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Polygon, Text};
+use vasos_engine::analyze::{CurveOptions, LoopFunction, OpenLoop, frequency_curve};
+use vasos_engine::control::PidGains;
+use vasos_engine::model::ProcessModel;
+
+use crate::action::Action;
+use crate::panes::View;
+use crate::panes::tune::row_in_view;
+use crate::tuning::{PRESENT, Row};
+use crate::{text, theme, tr};
+
+/// Points of the curve further away than this are left out: integral action runs to infinity.
+const FARTHEST: f64 = 60.0;
+
+/// State of the pane.
+#[derive(Default)]
+pub struct State {
+    cached: Vec<(ProcessModel, PidGains, Vec<[f64; 3]>)>,
+}
+
+impl State {
+    /// (Re L, Im L, ω) along the curve.
+    fn curve(&mut self, model: &ProcessModel, gains: &PidGains) -> Vec<[f64; 3]> {
+        if let Some(i) = self.cached.iter().position(|(m, g, _)| m == model && g == gains) {
+            return self.cached[i].2.clone();
+        }
+        let open = OpenLoop::new(model, gains);
+        let points = frequency_curve(&open, LoopFunction::OpenLoop, &CurveOptions::default());
+        let curve: Vec<[f64; 3]> =
+            points.into_iter().filter(|(_, l)| l.norm() < FARTHEST).map(|(w, l)| [l.re, l.im, w]).collect();
+        if self.cached.len() >= 8 {
+            self.cached.remove(0);
+        }
+        self.cached.push((model.clone(), *gains, curve.clone()));
+        curve
+    }
+}
+
+/// Draws the pane.
+pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
+    let (Some(model), Some(row)) = (&view.tuning.model, row_in_view(view)) else {
+        ui.add(egui::Label::new(RichText::new(tr!("nyquist.no_model")).color(theme::palette(ui).weak)).wrap());
+        return vec![];
+    };
+    let p = theme::palette(ui);
+    figures(ui, row);
+    let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
+    let curve = state.curve(model, &row.gains);
+    let ghost = present.map(|r| state.curve(model, &r.gains));
+    let names = [tr!("nyquist.loop"), tr!("rules.present")];
+    let hover = curve.clone();
+    Plot::new("nyquist")
+        .data_aspect(1.0)
+        .allow_scroll(false)
+        .include_x(-2.4)
+        .include_x(0.8)
+        .include_y(-2.2)
+        .include_y(1.0)
+        .default_x_bounds(-2.4, 0.8)
+        .default_y_bounds(-2.2, 1.0)
+        .auto_bounds([false, false])
+        .x_axis_label("Re L(jω)")
+        .y_axis_label("Im L(jω)")
+        .grid_color(p.grid)
+        .label_formatter(move |position| {
+            let at = match position {
+                egui_plot::HoverPosition::NearDataPoint { position, .. } | egui_plot::HoverPosition::Elsewhere { position } => *position,
+            };
+            let near = |q: &[f64; 3]| (q[0] - at.x).hypot(q[1] - at.y);
+            let nearest = hover.iter().min_by(|a, b| near(a).total_cmp(&near(b)))?;
+            (near(nearest) < 0.15).then(|| {
+                format!("ω = {} rad/s\n|L| = {}", text::brief(nearest[2]), text::brief(nearest[0].hypot(nearest[1])))
+            })
+        })
+        .show(ui, |plot| {
+            circles(plot, row, &p);
+            if let Some(ghost) = ghost {
+                plot.line(Line::new(names[1].clone(), plane(&ghost)).color(p.ghost).width(1.2));
+            }
+            plot.line(Line::new(names[0].clone(), plane(&curve)).color(p.pv).width(theme::LINE));
+            plot.points(Points::new("−1", vec![[-1.0, 0.0]]).radius(4.5).color(p.alarm));
+            let label = RichText::new("−1").color(p.text).size(theme::BODY);
+            plot.text(Text::new("", PlotPoint::new(-1.0, 0.16), label));
+        });
+    vec![]
+}
+
+fn plane(curve: &[[f64; 3]]) -> PlotPoints<'static> {
+    curve.iter().map(|q| [q[0], q[1]]).collect::<Vec<_>>().into()
+}
+
+fn figures(ui: &mut egui::Ui, row: &Row) {
+    let a = &row.analysis;
+    let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(format!("{title} · {}", row.kind)).family(theme::bold()));
+        let p = theme::palette(ui);
+        let words = if a.stable {
+            tr!(
+                "nyquist.figures",
+                ms = text::maybe(a.ms),
+                mt = text::maybe(a.mt),
+                gm = text::maybe(a.gain_margin),
+                pm = text::maybe(a.phase_margin_deg),
+                dm = text::maybe(a.delay_margin_s)
+            )
+        } else {
+            tr!("tune.unstable_hint")
+        };
+        ui.label(RichText::new(words).size(theme::SMALL).color(if a.stable { p.weak } else { p.caution }));
+    });
+}
+
+/// |S| = Ms is the circle of radius 1/Ms about −1; |T| = Mt the one about −Mt²/(Mt² − 1) of radius Mt/(Mt² − 1),
+/// for Mt = 1 the line Re L = −½.
+fn circles(plot: &mut egui_plot::PlotUi<'_>, row: &Row, p: &theme::Palette) {
+    let circle = |x: f64, r: f64| -> PlotPoints<'static> {
+        (0..=128)
+            .map(|i| {
+                let a = std::f64::consts::TAU * f64::from(i) / 128.0;
+                [x + r * a.cos(), r * a.sin()]
+            })
+            .collect::<Vec<_>>()
+            .into()
+    };
+    let unit = Line::new("|L| = 1", circle(0.0, 1.0)).color(p.grid).width(1.0).style(LineStyle::dotted_dense());
+    plot.line(unit);
+    if let Some(ms) = row.analysis.ms {
+        let fill = Polygon::new(format!("Ms = {}", text::brief(ms)), circle(-1.0, 1.0 / ms));
+        let edge = egui::Stroke::new(1.2, p.accent_text);
+        plot.polygon(fill.fill_color(p.shade).stroke(edge).style(LineStyle::dashed_dense()));
+        let label = RichText::new(format!("Ms {}", text::brief(ms))).color(p.accent_text).size(theme::SMALL);
+        plot.text(Text::new("", PlotPoint::new(-1.0, -1.0 / ms - 0.12), label));
+    }
+    if let Some(mt) = row.analysis.mt {
+        let edge = egui::Stroke::new(1.2, p.sp);
+        let name = format!("Mt = {}", text::brief(mt));
+        if mt > 1.0 + 1e-6 {
+            let square = mt * mt - 1.0;
+            let outline = Line::new(name, circle(-mt * mt / square, mt / square)).stroke(edge);
+            plot.line(outline.style(LineStyle::dashed_dense()));
+        } else {
+            let line = vec![[-0.5, -FARTHEST], [-0.5, FARTHEST]];
+            plot.line(Line::new(name, line).stroke(edge).style(LineStyle::dashed_dense()));
+        }
+        let label = RichText::new(format!("Mt {}", text::brief(mt))).color(p.sp).size(theme::SMALL);
+        plot.text(Text::new("", PlotPoint::new(-0.5, -1.9), label).anchor(egui::Align2::LEFT_CENTER));
+    }
+}

@@ -1,0 +1,237 @@
+//! Rules compared on the model in use; one is looked at, and applied to the loop with one action.
+
+use eframe::egui::{self, RichText};
+use egui_extras::{Column, TableBuilder};
+use vasos_engine::control::PidTuning;
+use vasos_engine::document::{Candidate, DocumentCommand};
+use vasos_engine::tune::{ControllerKind, find_rule};
+
+use crate::action::Action;
+use crate::panes::View;
+use crate::tuning::{PRESENT, Row};
+use crate::widgets::segmented;
+use crate::{i18n, text, theme, tr};
+
+/// Form in which gains are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Form {
+    #[default]
+    Ideal,
+    Parallel,
+}
+
+/// State of the pane.
+#[derive(Default)]
+pub struct State {
+    kind: usize,
+    form: Form,
+}
+
+/// The row in view: the candidate, else the tuning in use.
+#[must_use]
+pub fn row_in_view<'a>(view: &View<'a>) -> Option<&'a Row> {
+    match &view.document.candidate {
+        Some(c) => view.tuning.find(&c.rule, &c.controller).or(view.tuning.rows.first()),
+        None => view.tuning.rows.first(),
+    }
+}
+
+/// Draws the pane.
+pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
+    let mut actions = vec![];
+    if view.tuning.model.is_none() {
+        ui.add(egui::Label::new(RichText::new(tr!("tune.no_model")).color(theme::palette(ui).weak)).wrap());
+        return actions;
+    }
+    ui.horizontal_wrapped(|ui| {
+        let kinds = [tr!("tune.all"), "PI".to_owned(), "PID".to_owned(), "P, PD".to_owned()];
+        if let Some(kind) = segmented(ui, &tr!("tune.controller"), &kinds, state.kind) {
+            state.kind = kind;
+        }
+        let forms = [tr!("tune.ideal"), tr!("tune.parallel")];
+        if let Some(form) = segmented(ui, &tr!("tune.form"), &forms, usize::from(state.form == Form::Parallel)) {
+            state.form = if form == 1 { Form::Parallel } else { Form::Ideal };
+        }
+    });
+    let below = 78.0;
+    let height = (ui.available_height() - below).max(60.0);
+    egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
+        table(ui, view, state, height, &mut actions);
+    });
+    details(ui, view, &mut actions);
+    actions
+}
+
+fn shown(state: &State, row: &Row) -> bool {
+    if row.rule == PRESENT {
+        return true;
+    }
+    match state.kind {
+        1 => row.kind == ControllerKind::Pi,
+        2 => row.kind == ControllerKind::Pid,
+        3 => matches!(row.kind, ControllerKind::P | ControllerKind::Pd),
+        _ => true,
+    }
+}
+
+fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &mut Vec<Action>) {
+    let p = theme::palette(ui);
+    let chosen = row_in_view(view).map(|r| (r.rule, r.kind));
+    let rows: Vec<&Row> = view.tuning.rows.iter().filter(|r| shown(state, r)).collect();
+    let entry = view.document.model();
+    let unit = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
+    let (pv, mv) = entry.map_or(("–".to_owned(), "–".to_owned()), |e| (unit(&e.pv_unit), unit(&e.mv_unit)));
+    let gains = match state.form {
+        Form::Ideal => [format!("Kc\n{mv}/{pv}"), "Ti\ns".to_owned(), "Td\ns".to_owned()],
+        Form::Parallel => [format!("Kp\n{mv}/{pv}"), format!("Ki\n{mv}/({pv}·s)"), format!("Kd\n{mv}·s/{pv}")],
+    };
+    let rest = [
+        ("Ms".to_owned(), tr!("tune.ms_hint")),
+        ("Mt".to_owned(), tr!("tune.mt_hint")),
+        (format!("Jv\n{pv}·s/{mv}"), tr!("tune.jv_hint")),
+        (format!("Ju\n{mv}/{pv}"), tr!("tune.ju_hint")),
+        (tr!("tune.iae_header"), tr!("tune.iae_hint")),
+        (tr!("tune.overshoot_header"), tr!("tune.overshoot_hint")),
+    ];
+    TableBuilder::new(ui)
+        .striped(true)
+        .sense(egui::Sense::click())
+        .cell_layout(egui::Layout::left_to_right(egui::Align::Center))
+        .column(Column::initial(148.0).at_least(110.0).clip(true))
+        .columns(Column::initial(42.0).at_least(34.0), 9)
+        .min_scrolled_height(40.0)
+        .max_scroll_height(height - 36.0)
+        .auto_shrink([false, true])
+        .header(32.0, |mut header| {
+            let small = |words: &str| RichText::new(words).size(theme::SMALL).color(p.weak);
+            header.col(|ui| {
+                ui.label(small(&tr!("tune.rule")));
+            });
+            for title in &gains {
+                header.col(|ui| {
+                    ui.label(small(title));
+                });
+            }
+            for (title, hint) in &rest {
+                header.col(|ui| {
+                    ui.label(small(title)).on_hover_text(hint);
+                });
+            }
+        })
+        .body(|body| {
+            body.rows(22.0, rows.len(), |mut line| {
+                let row = rows[line.index()];
+                line.set_selected(chosen == Some((row.rule, row.kind)));
+                cells(&mut line, row, state, &p);
+                if line.response().clicked() {
+                    let candidate = Candidate {
+                        rule: row.rule.to_owned(),
+                        controller: row.kind.id().to_owned(),
+                        gains: row.gains,
+                    };
+                    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate))));
+                    actions.push(Action::Seal);
+                }
+            });
+        });
+}
+
+fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, p: &theme::Palette) {
+    let ink = if line.index() == usize::MAX { p.weak } else { p.text };
+    let flagged = !row.valid || !row.analysis.stable;
+    line.col(|ui| {
+        let sign = if flagged { "! " } else { "" };
+        let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
+        let words = format!("{sign}{title} · {}", row.kind);
+        ui.add(egui::Label::new(RichText::new(words).color(ink)).truncate());
+    });
+    let g = &row.gains;
+    let none = |v: f64| if v == 0.0 || v.is_infinite() { "–".to_owned() } else { text::brief(v) };
+    let gains = match state.form {
+        Form::Ideal => [text::brief(g.kc), none(g.ti_s), none(g.td_s)],
+        Form::Parallel => [text::brief(g.kc), none(g.ki()), none(g.kd())],
+    };
+    for cell in gains {
+        line.col(|ui| {
+            ui.label(RichText::new(cell).color(ink));
+        });
+    }
+    if !row.analysis.stable {
+        line.col(|ui| {
+            ui.label(RichText::new(tr!("tune.unstable")).color(p.text));
+        });
+        for _ in 0..5 {
+            line.col(|_| {});
+        }
+        return;
+    }
+    let a = &row.analysis;
+    for value in [a.ms, a.mt, a.jv, a.ju, row.figures.iae_load, row.figures.overshoot_percent] {
+        line.col(|ui| {
+            ui.label(RichText::new(text::maybe(value)).color(ink));
+        });
+    }
+}
+
+fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
+    let Some(row) = row_in_view(view) else { return };
+    let p = theme::palette(ui);
+    let words = row.warnings.iter().map(|w| i18n::say(w)).collect::<Vec<_>>().join(" · ");
+    let words = if row.analysis.stable { words } else { tr!("tune.unstable_hint") };
+    let source = if words.is_empty() { row.source.to_owned() } else { format!("! {words}") };
+    let colour = if words.is_empty() { p.weak } else { p.caution };
+    let line = ui.add(egui::Label::new(RichText::new(&source).size(theme::SMALL).color(colour)).truncate());
+    line.on_hover_text(format!("{source}\n{}", row.source));
+    ui.horizontal_wrapped(|ui| {
+        let tag = view.snapshot.loops.first().map(|l| l.tag.clone());
+        let able = tag.is_some() && row.rule != PRESENT && row.gains.ti_s.is_finite() && matches_loop(view);
+        let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| tr!("tune.apply_to", tag = t));
+        let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
+        let hint = if row.gains.ti_s.is_finite() { tr!("tune.apply_hint") } else { tr!("tune.needs_integral") };
+        if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked() {
+            if let Some(tag) = tag {
+                actions.push(apply(view, row, tag));
+            }
+        }
+        if ui.button(tr!("tune.copy")).clicked() {
+            actions.push(Action::Copy(as_text(row)));
+        }
+        if let (Some(tau_c_s), Some(rule)) = (row.tau_c_s, find_rule(row.rule, row.kind)) {
+            let name = ui.label("τc");
+            let mut value = tau_c_s;
+            let field = egui::DragValue::new(&mut value).range(1e-3..=1e6).speed(tau_c_s / 100.0).max_decimals(3).suffix(" s");
+            let field = ui.add(field).labelled_by(name.id).on_hover_text(tr!("tune.tau_c_hint"));
+            if field.changed() {
+                actions.push(Action::Document(DocumentCommand::TauC(rule.id.to_owned(), Some(value))));
+            }
+            if field.drag_stopped() || field.lost_focus() {
+                actions.push(Action::Seal);
+            }
+            if view.document.tau_c_s.contains_key(rule.id) && ui.button(tr!("tune.default")).clicked() {
+                actions.push(Action::Document(DocumentCommand::TauC(rule.id.to_owned(), None)));
+            }
+        }
+    });
+}
+
+/// Whether the model's units are those of the loop; a model of another plant is for looking, unless its log gave
+/// no units.
+fn matches_loop(view: &View) -> bool {
+    view.document.model().is_some()
+}
+
+fn apply(view: &View, row: &Row, tag: String) -> Action {
+    let settings = view.document.rig.loops.get(&tag);
+    let (b, c) = settings.map_or((1.0, 0.0), |s| (s.tuning.b, s.tuning.c));
+    let filter_s = settings.map_or(0.0, |s| s.pv_filter_s);
+    // Unfiltered derivative action keeps the pump at its limits with this rig's noise; a filter of Td is what the
+    // specification ships AMIGO with (1 s).
+    let filter_s = if row.gains.td_s > 0.0 && filter_s == 0.0 { row.gains.td_s } else { filter_s };
+    let tuning = PidTuning { gains: row.gains, b, c };
+    Action::Document(DocumentCommand::ApplyTuning(tag, tuning, filter_s))
+}
+
+fn as_text(row: &Row) -> String {
+    let g = &row.gains;
+    format!("{} {}: Kc = {}, Ti = {} s, Td = {} s, N = {}", row.rule, row.kind, g.kc, g.ti_s, g.td_s, g.n)
+}

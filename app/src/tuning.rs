@@ -1,0 +1,159 @@
+//! Every rule on the model in use, analysed; kept until model or free time constants change.
+
+use vasos_engine::analyze::{Analysis, StepFigures, analyze, step_figures};
+use vasos_engine::control::PidGains;
+use vasos_engine::document::{Document, ModelEntry};
+use vasos_engine::model::ProcessModel;
+use vasos_engine::tune::{ControllerKind, Rule, RuleError, RuleOptions, RuleWarning, registry};
+
+/// Name of the row of the tuning in use.
+pub const PRESENT: &str = "present";
+
+/// A row that gave gains.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Id of the rule, or [`PRESENT`].
+    pub rule: &'static str,
+    /// Key of its title.
+    pub title_key: String,
+    /// Source.
+    pub source: &'static str,
+    /// Controller.
+    pub kind: ControllerKind,
+    /// Gains.
+    pub gains: PidGains,
+    /// Free time constant in seconds.
+    pub tau_c_s: Option<f64>,
+    /// Remarks.
+    pub warnings: Vec<RuleWarning>,
+    /// Used inside its range.
+    pub valid: bool,
+    /// What the loop is worth.
+    pub analysis: Analysis,
+    /// IAE and overshoot.
+    pub figures: StepFigures,
+}
+
+/// A rule that gave none.
+#[derive(Debug, Clone)]
+pub struct Refusal {
+    /// Key of its title.
+    pub title_key: &'static str,
+    /// Controller.
+    pub kind: ControllerKind,
+    /// Why.
+    pub error: RuleError,
+}
+
+/// The table.
+#[derive(Debug, Default)]
+pub struct TuningTable {
+    /// Model it was made for.
+    pub model: Option<ProcessModel>,
+    /// Rows, the tuning in use first.
+    pub rows: Vec<Row>,
+    /// Rules that gave nothing.
+    pub refusals: Vec<Refusal>,
+    key: Option<Key>,
+}
+
+#[derive(Debug, PartialEq, Clone)]
+struct Key {
+    number: u32,
+    model: ProcessModel,
+    tau_c_s: Vec<(String, f64)>,
+    present: Option<PidGains>,
+}
+
+impl TuningTable {
+    /// Brings the table in line with the document; does nothing when it is.
+    pub fn update(&mut self, document: &Document) {
+        let Some(entry) = document.model() else {
+            if self.key.is_some() {
+                *self = Self::default();
+            }
+            return;
+        };
+        let key = key(document, entry);
+        if self.key.as_ref() == Some(&key) {
+            return;
+        }
+        let same_model = self.key.as_ref().is_some_and(|k| k.model == key.model);
+        let old = if same_model { std::mem::take(&mut self.rows) } else { vec![] };
+        self.rows.clear();
+        self.refusals.clear();
+        if let Some(gains) = key.present {
+            self.rows.push(judged(&entry.model, &old, PRESENT, gains));
+        }
+        for rule in registry() {
+            for &kind in rule.controllers {
+                let options = RuleOptions { tau_c_s: document.tau_c_s.get(rule.id).copied(), ..RuleOptions::default() };
+                self.apply(&entry.model, &old, rule, kind, &options);
+            }
+        }
+        self.model = Some(entry.model.clone());
+        self.key = Some(key);
+    }
+
+    fn apply(
+        &mut self,
+        model: &ProcessModel,
+        old: &[Row],
+        rule: &'static Rule,
+        kind: ControllerKind,
+        options: &RuleOptions,
+    ) {
+        match rule.tune(model, kind, options) {
+            Ok(tuning) => {
+                let valid = tuning.valid();
+                let mut row = judged(model, old, rule.id, tuning.gains);
+                row.title_key = rule.title_key.to_owned();
+                row.source = rule.source;
+                row.kind = kind;
+                row.tau_c_s = tuning.tau_c_s.filter(|_| rule.has_free_time_constant());
+                row.warnings = tuning.warnings;
+                row.valid = valid;
+                self.rows.push(row);
+            }
+            Err(error) => self.refusals.push(Refusal { title_key: rule.title_key, kind, error }),
+        }
+    }
+
+    /// The row of a rule and controller.
+    #[must_use]
+    pub fn find(&self, rule: &str, controller: &str) -> Option<&Row> {
+        self.rows.iter().find(|r| r.rule == rule && r.kind.id() == controller)
+    }
+}
+
+fn key(document: &Document, entry: &ModelEntry) -> Key {
+    let tag = document.rig.active_loops().first().map(|l| l.id.clone());
+    let present = tag.and_then(|t| document.rig.loops.get(&t)).map(|l| l.tuning.gains);
+    Key {
+        number: entry.number,
+        model: entry.model.clone(),
+        tau_c_s: document.tau_c_s.iter().map(|(k, v)| (k.clone(), *v)).collect(),
+        present,
+    }
+}
+
+/// A row with its figures, taken from an older table where the gains are the same.
+fn judged(model: &ProcessModel, old: &[Row], rule: &'static str, gains: PidGains) -> Row {
+    let known = old.iter().find(|r| r.gains == gains).map(|r| (r.analysis, r.figures));
+    let (analysis, figures) = known.unwrap_or_else(|| {
+        let analysis = analyze(model, &gains);
+        (analysis, step_figures(model, &gains, &analysis))
+    });
+    Row {
+        rule,
+        title_key: format!("rules.{rule}"),
+        source: "",
+        kind: ControllerKind::of(&gains),
+        gains,
+        tau_c_s: None,
+        warnings: vec![],
+        valid: true,
+        analysis,
+        figures,
+    }
+}

@@ -1,0 +1,257 @@
+//! Files into the window: dropped, chosen or typed; logs with their import sheet, rigs.
+
+use std::path::{Path, PathBuf};
+
+use eframe::egui;
+use vasos_engine::document::{DocumentCommand, LogRoles};
+use vasos_io::log::{ImportOptions, ImportedLog, import_log};
+use vasos_io::rig::{FileError, load_rig};
+
+use super::Workbench;
+use super::jobs::Outcome;
+use crate::action::Action;
+use crate::journal::Weight;
+use crate::{i18n, text, theme, tr};
+
+/// Rows shown before an import.
+const PREVIEW_ROWS: usize = 6;
+
+/// A log that was read and waits for its columns to be confirmed.
+pub struct ImportSheet {
+    path: PathBuf,
+    log: ImportedLog,
+    roles: LogRoles,
+    sample_time_s: f64,
+}
+
+impl ImportSheet {
+    /// A sheet with the columns the importer proposes.
+    pub fn new(path: PathBuf, log: ImportedLog) -> Self {
+        let proposed = &log.report.roles;
+        let index = |name: &Option<String>| name.as_deref().and_then(|n| log.table.index_of(n));
+        let roles = LogRoles { pv: index(&proposed.pv), sp: index(&proposed.sp), mv: index(&proposed.mv) };
+        Self { path, log, roles, sample_time_s: 1.0 }
+    }
+}
+
+/// Reads a file in a job: a rig when it ends in `.toml`, else a log.
+pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        return match load_rig(&path.to_string_lossy()) {
+            Ok(network) => Outcome::Rig(path.to_owned(), network),
+            Err(error) => Outcome::Failed(Box::new(error)),
+        };
+    }
+    let shown = path.display().to_string();
+    if path.is_dir() {
+        let reason = tr!("window.is_folder");
+        return Outcome::Failed(Box::new(FileError::Read { path: shown, reason }));
+    }
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return Outcome::Failed(Box::new(FileError::Read { path: shown, reason: error.to_string() })),
+    };
+    let name = path.file_name().map_or(shown, |n| n.to_string_lossy().into_owned());
+    match import_log(&name, &bytes, options) {
+        Ok(log) => Outcome::Log(path.to_owned(), log),
+        Err(error) => Outcome::Failed(Box::new(error)),
+    }
+}
+
+impl Workbench {
+    /// Opens what was dropped on the window.
+    pub(super) fn take_dropped(&mut self, ctx: &egui::Context) {
+        let dropped: Vec<PathBuf> =
+            ctx.input(|i| i.raw.dropped_files.iter().filter_map(|f| f.path().map(Path::to_owned)).collect());
+        if let Some(path) = dropped.into_iter().next() {
+            self.act(ctx, Action::OpenFile(path));
+        }
+    }
+
+    /// Takes what jobs came to.
+    pub(super) fn take_results(&mut self, ctx: &egui::Context) {
+        for outcome in self.jobs.results() {
+            match outcome {
+                Outcome::Log(path, log) => {
+                    let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
+                    self.tell(Weight::Note, words);
+                    self.import = Some(ImportSheet::new(path, log));
+                }
+                Outcome::Rig(path, network) => {
+                    self.settings.remember(path);
+                    self.act(ctx, Action::Document(DocumentCommand::OpenRig(network)));
+                }
+                Outcome::Model(model) => self.act(ctx, Action::Document(DocumentCommand::AddModel(model))),
+                Outcome::Chosen(path) => self.act(ctx, Action::OpenFile(path)),
+                Outcome::Cancelled => {}
+                Outcome::NoDialog => self.path_field = Some(String::new()),
+                Outcome::Failed(error) => {
+                    let words = i18n::say(&*error);
+                    self.tell(Weight::Alarm, words.clone());
+                    self.notice = Some(words);
+                }
+            }
+        }
+    }
+
+    /// The field for a path, where the system has no file dialog.
+    pub(super) fn path_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) {
+        let Some(path) = &mut self.path_field else { return };
+        let mut open = true;
+        let mut chosen = false;
+        egui::Window::new(tr!("window.path_title")).open(&mut open).collapsible(false).resizable(false).show(ui.ctx(), |ui| {
+            ui.label(tr!("window.path_hint"));
+            let field = ui.add(egui::TextEdit::singleline(path).desired_width(420.0));
+            field.request_focus();
+            chosen = ui.input(|i| i.key_pressed(egui::Key::Enter)) || ui.button(tr!("window.open")).clicked();
+        });
+        if chosen && !path.trim().is_empty() {
+            actions.push(Action::OpenFile(PathBuf::from(path.trim())));
+            open = false;
+        }
+        if !open {
+            self.path_field = None;
+        }
+    }
+
+    /// What the import sheet asks for.
+    pub(super) fn import_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) {
+        let Some(mut sheet) = self.import.take() else { return };
+        match sheet_ui(ui, &mut sheet) {
+            Answer::None => self.import = Some(sheet),
+            Answer::Use => {
+                for repair in &sheet.log.report.repairs {
+                    self.tell(Weight::Caution, i18n::say(repair));
+                }
+                self.settings.remember(sheet.path.clone());
+                let table = std::sync::Arc::new(sheet.log.table);
+                actions.push(Action::Document(DocumentCommand::OpenLog(table, sheet.roles)));
+            }
+            Answer::Cancel => self.tell(Weight::Note, tr!("import_sheet.cancelled", name = sheet.log.table.name)),
+            Answer::ReadAgain => {
+                let options = ImportOptions { sample_time_s: Some(sheet.sample_time_s), ..ImportOptions::default() };
+                let path = sheet.path.clone();
+                self.jobs.start("import", move || read(&path, &options));
+            }
+        }
+    }
+}
+
+enum Answer {
+    None,
+    Use,
+    Cancel,
+    ReadAgain,
+}
+
+fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
+    let mut answer = Answer::None;
+    let modal = egui::Modal::new(egui::Id::new("import")).show(ui.ctx(), |ui| {
+        ui.set_max_width(760.0);
+        ui.heading(tr!("import_sheet.title", name = sheet.log.table.name));
+        facts(ui, sheet);
+        ui.add_space(theme::GAP);
+        egui::ScrollArea::horizontal().id_salt("preview").show(ui, |ui| preview(ui, sheet));
+        ui.add_space(theme::GAP);
+        ui.horizontal_wrapped(|ui| {
+            let ImportSheet { log, roles, .. } = sheet;
+            for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
+                column_choice(ui, what, role, &log.table);
+            }
+        });
+        if sheet.log.report.time_column.is_none() {
+            ui.horizontal(|ui| {
+                let name = ui.label(tr!("import_sheet.sample_time"));
+                let field = egui::DragValue::new(&mut sheet.sample_time_s).range(1e-6..=1e6).speed(0.01).suffix(" s");
+                ui.add(field).labelled_by(name.id);
+                if ui.button(tr!("import_sheet.again")).clicked() {
+                    answer = Answer::ReadAgain;
+                }
+            });
+        }
+        let p = theme::palette(ui);
+        egui::ScrollArea::vertical().id_salt("repairs").max_height(110.0).show(ui, |ui| {
+            for repair in &sheet.log.report.repairs {
+                ui.add(egui::Label::new(egui::RichText::new(format!("! {}", i18n::say(repair))).color(p.caution)).wrap());
+            }
+        });
+        let same = sheet.roles.pv.is_some() && sheet.roles.pv == sheet.roles.mv;
+        if same || sheet.roles.pv.is_none() || sheet.roles.mv.is_none() {
+            let key = if same { "said.document.same_column" } else { "import_sheet.choose" };
+            ui.label(egui::RichText::new(format!("! {}", tr!(key))).color(p.caution));
+        }
+        ui.add_space(theme::GAP);
+        ui.horizontal(|ui| {
+            let take = egui::Button::new(egui::RichText::new(tr!("import_sheet.use")).color(p.on_accent)).fill(p.accent);
+            if ui.add_enabled(!same, take).clicked() {
+                answer = Answer::Use;
+            }
+            if ui.button(tr!("import_sheet.cancel")).clicked() {
+                answer = Answer::Cancel;
+            }
+        });
+    });
+    if modal.should_close() && matches!(answer, Answer::None) { Answer::Cancel } else { answer }
+}
+
+fn facts(ui: &mut egui::Ui, sheet: &ImportSheet) {
+    let table = &sheet.log.table;
+    let length_s = table.time_s.last().copied().unwrap_or(0.0);
+    let time = sheet.log.report.time_column.clone().unwrap_or_else(|| tr!("import_sheet.no_time"));
+    ui.label(tr!(
+        "import_sheet.facts",
+        rows = table.len(),
+        columns = table.columns.len(),
+        length = text::brief(length_s),
+        time = time
+    ));
+}
+
+fn preview(ui: &mut egui::Ui, sheet: &ImportSheet) {
+    let table = &sheet.log.table;
+    egui::Grid::new("preview").striped(true).spacing([14.0, 3.0]).show(ui, |ui| {
+        ui.strong(tr!("import_sheet.time"));
+        for (i, column) in table.columns.iter().enumerate() {
+            let unit = column.unit.as_ref().map_or(String::new(), |u| format!(" [{u}]"));
+            let role = [("PV", sheet.roles.pv), ("SP", sheet.roles.sp), ("MV", sheet.roles.mv)];
+            let role = role.iter().find(|(_, r)| *r == Some(i)).map_or(String::new(), |(name, _)| format!("  · {name}"));
+            ui.strong(format!("{}{unit}{role}", column.name));
+        }
+        ui.end_row();
+        for row in 0..PREVIEW_ROWS.min(table.len()) {
+            ui.label(text::brief(table.time_s[row]));
+            for column in &table.columns {
+                let value = column.values[row];
+                let state = column.states.get(value as usize).filter(|_| !column.states.is_empty() && value >= 0.0);
+                ui.label(state.cloned().unwrap_or_else(|| text::brief(value)));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// A choice of a column, or of none.
+pub fn column_choice(
+    ui: &mut egui::Ui,
+    what: &str,
+    role: &mut Option<usize>,
+    table: &vasos_engine::signal::LogTable,
+) -> bool {
+    let before = *role;
+    let none = tr!("import_sheet.none");
+    let name = |i: usize| table.columns.get(i).map_or_else(|| none.clone(), |c| c.name.clone());
+    let label = ui.label(egui::RichText::new(what).family(theme::bold()));
+    egui::ComboBox::from_id_salt(what)
+        .width(120.0)
+        .truncate()
+        .selected_text(role.map_or_else(|| none.clone(), name))
+        .show_ui(ui, |ui| {
+            ui.selectable_value(role, None, &none);
+            for i in 0..table.columns.len() {
+                ui.selectable_value(role, Some(i), name(i));
+            }
+        })
+        .response
+        .labelled_by(label.id);
+    before != *role
+}
