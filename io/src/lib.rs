@@ -6,3 +6,4 @@
 pub mod log;
 pub mod rig;
 pub mod settings;
+pub mod recording;

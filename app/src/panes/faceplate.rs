@@ -1,7 +1,7 @@
 //! The faceplate of a loop: PV, SP and MV on bars, mode, keys, tuning in use, alarms.
 
-use eframe::egui::{self, Align2, Color32, FontId, Rect, Sense, Stroke, WidgetInfo, WidgetType, pos2, vec2};
-use vasos_engine::control::{Mode, PidGains, PidTuning};
+use eframe::egui::{self, Align2, Color32, FontId, Rect, Sense, Stroke, WidgetInfo, Role, pos2, vec2};
+use vasos_engine::control::Mode;
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{LoopNow, RigCommand};
 
@@ -41,15 +41,16 @@ fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, act
         if let Some(chosen) = segmented(ui, &tr!("faceplate.loop"), &tags, state.shown) {
             state.shown = chosen;
         }
-    } else {
+    }
+    ui.horizontal(|ui| {
         ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
-    }
-    let modes = [tr!("mode.man"), tr!("mode.auto")];
-    let chosen = usize::from(now.mode == Mode::Automatic);
-    if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {
-        let mode = if chosen == 1 { Mode::Automatic } else { Mode::Manual };
-        actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), mode)));
-    }
+        let modes = [tr!("mode.man"), tr!("mode.auto")];
+        let chosen = usize::from(now.mode == Mode::Automatic);
+        if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {
+            let mode = if chosen == 1 { Mode::Automatic } else { Mode::Manual };
+            actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), mode)));
+        }
+    });
 }
 
 fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
@@ -58,7 +59,7 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
     let pump = &network.pumps[now.pump];
     let unit = network.spec.pumps[now.pump].unit.symbol();
-    let height = (ui.available_height() - 250.0).clamp(60.0, 230.0);
+    let height = (ui.available_height() - 282.0).clamp(64.0, 260.0);
     let columns = [
         ("PV", now.pv_cm, 0.0, rim, "cm", 2, p.pv),
         ("SP", now.setpoint_cm, 0.0, rim, "cm", 2, p.sp),
@@ -67,7 +68,7 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 56.0), Sense::hover());
     response.widget_info(|| {
         let words = columns.map(|(n, v, .., u, d, _)| format!("{n} {} {u}", text::fixed(v, d))).join(", ");
-        WidgetInfo::labeled(WidgetType::Label, true, words)
+        WidgetInfo::labeled(Role::Label, true, words)
     });
     let width = rect.width() / 3.0;
     for (i, (name, value, low, high, unit, decimals, colour)) in columns.into_iter().enumerate() {
@@ -132,6 +133,9 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
         if response.drag_stopped() || response.lost_focus() {
             actions.push(Action::Seal);
         }
+        if ui.button(tr!("faceplate.steady")).on_hover_text(tr!("faceplate.steady_hint")).clicked() {
+            actions.push(Action::SteadyAt(now.tag.clone(), now.setpoint_cm));
+        }
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -146,9 +150,6 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
             }
         }
     });
-    if ui.button(tr!("faceplate.steady")).on_hover_text(tr!("faceplate.steady_hint")).clicked() {
-        actions.push(Action::SteadyAt(now.tag.clone(), now.setpoint_cm));
-    }
 }
 
 fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
@@ -156,7 +157,7 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let unit = view.snapshot.network.spec.pumps[now.pump].unit.symbol();
     let action = if now.tuning.gains.kc > 0.0 { tr!("faceplate.reverse") } else { tr!("faceplate.direct") };
     ui.label(egui::RichText::new(format!("PID-I2GL · {action}")).small());
-    let PidTuning { gains, b, c } = settings.tuning;
+    let gains = settings.tuning.gains;
     let mut edited = settings.tuning;
     let mut filter_s = settings.pv_filter_s;
     let mut changed = false;
@@ -181,7 +182,6 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
         filter_changed |= field(ui, "Tf", tr!("gain.pv_filter"), &mut filter_s, " s".to_owned(), 0.02);
         ui.end_row();
     });
-    let _ = (b, c, PidGains::DEFAULT_N);
     if changed {
         actions.push(Action::Document(DocumentCommand::Tuning(now.tag.clone(), edited)));
     }
@@ -191,7 +191,6 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     if done {
         actions.push(Action::Seal);
     }
-    ui.weak(format!("MV {}…{} {unit}", text::brief(view.snapshot.network.pumps[now.pump].min), text::brief(view.snapshot.network.pumps[now.pump].max)));
 }
 
 fn alarms(ui: &mut egui::Ui, view: &View, now: &LoopNow) {

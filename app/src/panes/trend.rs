@@ -74,7 +74,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     if state.follow {
         let span = SPANS_S[state.span].unwrap_or_else(|| content.end_s.max(60.0));
         let end = content.end_s.max(span);
-        state.bounds_s = [end - span, end + 0.02 * span];
+        state.bounds_s = [end - span, end + 0.05 * span];
     }
     let height = ui.available_height();
     let upper = (height * 0.62).max(60.0);
@@ -137,7 +137,7 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
         let unit = spec.pumps[now.pump].unit.symbol();
         units.push(unit);
         let shade = |c: Color32| if slot == 0 { c } else { c.gamma_multiply(0.55 + 0.1 * slot as f32) };
-        let mut push = |to: &mut Vec<Curve<'a>>, run: &'a crate::traces::RunTrace, kind, name: String, colour, steps, thin| {
+        let push = |to: &mut Vec<Curve<'a>>, run: &'a crate::traces::RunTrace, kind, name: String, colour, steps, thin| {
             if let Some(data) = run.column(kind) {
                 to.push(Curve { name, data, colour, steps, thin });
             }
@@ -212,9 +212,9 @@ fn plot(
         .allow_zoom(egui::Vec2b::new(true, false))
         .allow_boxed_zoom(false)
         .allow_double_click_reset(false)
-        .link_cursor(Id::new("trend"), [true, false])
+        .link_cursor(Id::unique("trend"), [true, false])
         .y_axis_label(axis.clone())
-        .y_axis_min_width(44.0)
+        .y_axis_min_width(52.0)
         .x_axis_formatter(time_axis)
         .show_axes([true, true])
         .grid_color(p.grid)

@@ -1,6 +1,6 @@
 //! Buttons with a drawn sign: crisp at every size, and no font has to have it.
 
-use eframe::egui::{self, Color32, Painter, Rect, Sense, Shape, Stroke, Vec2, WidgetInfo, WidgetType, pos2, vec2};
+use eframe::egui::{self, Color32, Painter, Rect, Sense, Shape, Stroke, Vec2, WidgetInfo, Role, pos2, vec2};
 
 use crate::theme;
 
@@ -34,7 +34,7 @@ pub fn icon_button(ui: &mut egui::Ui, icon: Icon, name: &str, enabled: bool) -> 
     let size = Vec2::splat(theme::PRESS);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
     let (rect, response) = ui.allocate_exact_size(size, sense);
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, enabled, name));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));
     let visuals = if enabled { *ui.style().interact(&response) } else { ui.visuals().widgets.inactive };
     ui.painter().rect(rect, visuals.corner_radius, visuals.weak_bg_fill, visuals.bg_stroke, egui::StrokeKind::Inside);
     let p = theme::palette(ui);

@@ -62,7 +62,7 @@ impl Workbench {
     /// Opens what was dropped on the window.
     pub(super) fn take_dropped(&mut self, ctx: &egui::Context) {
         let dropped: Vec<PathBuf> =
-            ctx.input(|i| i.raw.dropped_files.iter().filter_map(|f| f.path().map(Path::to_owned)).collect());
+            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if let Some(path) = dropped.into_iter().next() {
             self.act(ctx, Action::OpenFile(path));
         }
@@ -146,7 +146,7 @@ enum Answer {
 
 fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
     let mut answer = Answer::None;
-    let modal = egui::Modal::new(egui::Id::new("import")).show(ui.ctx(), |ui| {
+    let modal = egui::Modal::new(egui::Id::unique("import")).show(ui.ctx(), |ui| {
         ui.set_max_width(760.0);
         ui.heading(tr!("import_sheet.title", name = sheet.log.table.name));
         facts(ui, sheet);

@@ -289,3 +289,23 @@ impl eframe::App for Workbench {
         }
     }
 }
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// When the system gives no window.
+pub fn open(options: Options) -> anyhow::Result<()> {
+    let native = eframe::NativeOptions {
+        renderer: eframe::Renderer::Glow,
+        viewport: egui::ViewportBuilder::default()
+            .with_app_id("vasos")
+            .with_title("Vasos")
+            .with_inner_size([1440.0, 900.0])
+            .with_min_inner_size([960.0, 600.0])
+            .with_drag_and_drop(true),
+        persist_window: true,
+        ..eframe::NativeOptions::default()
+    };
+    let create: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(Workbench::new(&cc.egui_ctx, options)?)));
+    eframe::run_native("vasos", native, create).map_err(|e| anyhow::anyhow!("{e}"))
+}

@@ -10,7 +10,7 @@ use crate::{theme, tr};
 /// The arrangement at the first start: plant, faceplate and trend above, the tuning chain below.
 pub fn first_layout() -> Tree<PaneKind> {
     let mut tiles = Tiles::default();
-    let mut tab = |tiles: &mut Tiles<PaneKind>, panes: &[PaneKind]| {
+    let tab = |tiles: &mut Tiles<PaneKind>, panes: &[PaneKind]| {
         let children = panes.iter().map(|p| tiles.insert_pane(*p)).collect();
         tiles.insert_tab_tile(children)
     };
@@ -29,12 +29,12 @@ pub fn first_layout() -> Tree<PaneKind> {
         tiles.insert_container(Container::Linear(linear))
     };
     let above = row(&mut tiles, above, &[1.0, 0.44, 1.1]);
-    let below = row(&mut tiles, below, &[0.85, 1.25, 0.75, 0.8]);
+    let below = row(&mut tiles, below, &[0.8, 1.35, 0.72, 0.75]);
     let mut both = Linear::new(LinearDir::Vertical, vec![above, below]);
-    both.shares.set_share(above, 1.18);
+    both.shares.set_share(above, 1.2);
     both.shares.set_share(below, 1.0);
     let root = tiles.insert_container(Container::Linear(both));
-    Tree::new("panes", root, tiles)
+    Tree::new(egui::Id::unique("panes"), root, tiles)
 }
 
 /// Whether an arrangement still has every pane once.
@@ -94,7 +94,7 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
         egui::RichText::new(tr!(pane.key())).family(theme::bold()).into()
     }
 
-    fn on_tab_button(&mut self, tiles: &Tiles<PaneKind>, tile_id: TileId, button: egui::Response) -> egui::Response {
+    fn on_tab_button(&mut self, tiles: &mut Tiles<PaneKind>, tile_id: TileId, button: egui::Response) -> egui::Response {
         if button.double_clicked() {
             if let Some(kind) = tiles.get_pane(&tile_id) {
                 self.actions.push(Action::Maximise(*kind));
@@ -113,6 +113,15 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
 
     fn gap_width(&self, _style: &egui::Style) -> f32 {
         6.0
+    }
+
+    fn resize_stroke(&self, style: &egui::Style, state: egui_tiles::ResizeState) -> egui::Stroke {
+        match state {
+            egui_tiles::ResizeState::Idle => egui::Stroke::new(self.gap_width(style), style.visuals.panel_fill),
+            egui_tiles::ResizeState::Hovering | egui_tiles::ResizeState::Dragging => {
+                egui::Stroke::new(2.0, style.visuals.hyperlink_color)
+            }
+        }
     }
 
     fn min_size(&self) -> f32 {

@@ -51,7 +51,10 @@ impl Workbench {
     }
 
     fn menus(&self, ui: &mut egui::Ui, document: &Document, actions: &mut Vec<Action>) {
-        egui::MenuBar::new().ui(ui, |ui| {
+        ui.scope(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            ui.visuals_mut().widgets.inactive.weak_bg_fill = egui::Color32::TRANSPARENT;
+            ui.visuals_mut().widgets.inactive.bg_stroke = egui::Stroke::NONE;
             ui.menu_button(tr!("menu.file"), |ui| {
                 if ui.add(egui::Button::new(tr!("menu.open")).shortcut_text("Ctrl+O")).clicked() {
                     actions.push(Action::AskFile);
@@ -239,7 +242,7 @@ impl Workbench {
         let Some(words) = self.notice.clone() else { return };
         let p = theme::palette(ui);
         let mut away = false;
-        egui::Area::new(egui::Id::new("notice"))
+        egui::Area::new(egui::Id::unique("notice"))
             .anchor(egui::Align2::CENTER_BOTTOM, egui::vec2(0.0, -40.0))
             .order(egui::Order::Foreground)
             .show(ui.ctx(), |ui| {

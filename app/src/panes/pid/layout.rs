@@ -7,7 +7,7 @@ use vasos_engine::plant::Network;
 use vasos_engine::plant::spec::ValveDrive;
 
 /// Size of a tank, in grid units.
-const TANK: Vec2 = vec2(1.2, 0.74);
+const TANK: Vec2 = vec2(1.2, 0.62);
 /// Height of a tank that gives its own width, such as a reservoir.
 const RESERVOIR_HEIGHT: f32 = 0.5;
 /// How far above the tanks a pump's pipe runs.

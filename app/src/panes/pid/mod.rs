@@ -6,7 +6,7 @@ mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{self, Id, Rect, Sense, WidgetInfo, WidgetType, vec2};
+use eframe::egui::{self, Id, Rect, Sense, WidgetInfo, Role, vec2};
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::plant::Network;
 use vasos_engine::session::RigCommand;
@@ -89,7 +89,7 @@ fn valve_ui(
     scale: f32,
     actions: &mut Vec<Action>,
 ) {
-    let response = ui.interact(paint::valve_rect(valve, scale), Id::new(("valve", index)), Sense::click_and_drag());
+    let response = ui.interact(paint::valve_rect(valve, scale), Id::unique(("valve", index)), Sense::click_and_drag());
     let shown = view.document.rig.angles_deg.get(index).copied().unwrap_or(valve.angle_deg);
     response.widget_info(|| WidgetInfo::slider(true, shown, tr!("pid.valve", tag = valve.tag)));
     let turn = |angle_deg: f64| {
@@ -146,8 +146,8 @@ fn valve_ui(
 }
 
 fn tank_popup(ui: &mut egui::Ui, view: &View, index: usize, tank: &TankView, actions: &mut Vec<Action>) {
-    let response = ui.interact(tank.rect, Id::new(("tank", index)), Sense::click());
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!("pid.tank", tag = tank.tag)));
+    let response = ui.interact(tank.rect, Id::unique(("tank", index)), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr!("pid.tank", tag = tank.tag)));
     let is_reservoir = view.snapshot.network.reservoir == Some(index);
     egui::Popup::menu(&response).close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
         ui.strong(tr!("pid.tank", tag = tank.tag));
@@ -179,8 +179,8 @@ fn tank_popup(ui: &mut egui::Ui, view: &View, index: usize, tank: &TankView, act
 
 fn pump_ui(ui: &mut egui::Ui, view: &View, index: usize, pump: &PumpView, scale: f32, actions: &mut Vec<Action>) {
     let rect = Rect::from_center_size(pump.at, egui::Vec2::splat(2.0 * paint::bubble_radius(scale)));
-    let response = ui.interact(rect, Id::new(("pump", index)), Sense::click());
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tr!("pid.pump", tag = pump.tag)));
+    let response = ui.interact(rect, Id::unique(("pump", index)), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr!("pid.pump", tag = pump.tag)));
     let p = theme::palette(ui);
     paint::pump(ui.painter(), pump, scale, response.hovered() || response.has_focus(), &p);
     egui::Popup::menu(&response).close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show(|ui| {

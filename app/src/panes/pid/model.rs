@@ -112,6 +112,8 @@ pub struct PidModel {
     pub pumps: Vec<PumpView>,
     /// Sensors, then controllers.
     pub bubbles: Vec<BubbleView>,
+    /// Taps from tanks to their sensors.
+    pub taps: Vec<[Pos2; 2]>,
     /// Signal lines of the loops in operation.
     pub signals: Vec<Vec<Pos2>>,
     /// Pixels per grid unit.
@@ -161,7 +163,9 @@ impl PidModel {
             })
             .collect();
         let (bubbles, signals) = instruments(snapshot, layout, &frame);
-        Self { tanks, valves, pumps, bubbles, signals, scale: frame.scale() }
+        let taps = layout.sensors.iter().zip(&snapshot.network.sensors);
+        let taps = taps.map(|(at, s)| [pos2(layout.tanks[s.tank].right(), at.y), *at].map(|q| frame.point(q))).collect();
+        Self { tanks, valves, pumps, bubbles, taps, signals, scale: frame.scale() }
     }
 }
 
@@ -217,12 +221,10 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             abnormal: false,
             automatic: Some(now.mode == Mode::Automatic),
         });
-        let tank = layout.tanks[snapshot.network.sensors[now.sensor].tank];
-        let wall = pos2(tank.right(), sensor.y);
         let down = snapshot.network.pumps[now.pump].from.is_some();
         let corner = if down { pos2(controller.x, pump.y - 0.06) } else { pos2(controller.x, pump.y - 0.14) };
-        let end = if down { pos2(pump.x, corner.y) } else { pos2(pump.x, corner.y) };
-        let mut line = vec![wall, sensor];
+        let end = pos2(pump.x, corner.y);
+        let mut line = vec![sensor];
         if sensor.x != controller.x && sensor.y != controller.y {
             line.push(pos2(controller.x, sensor.y));
         }

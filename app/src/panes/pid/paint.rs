@@ -32,6 +32,9 @@ pub fn paint(painter: &Painter, model: &PidModel, p: &Palette, phase: &dyn Fn(us
     for (i, valve) in model.valves.iter().enumerate() {
         stream(painter, &valve.stream, pipe_width, p, phase(offset + i));
     }
+    for tap in &model.taps {
+        painter.line_segment(*tap, Stroke::new(1.2, p.weak));
+    }
     for line in &model.signals {
         painter.extend(Shape::dashed_line(line, Stroke::new(1.2, p.weak), 5.0, 4.0));
     }
