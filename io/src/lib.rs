@@ -4,6 +4,6 @@
 //! an error that says what to do. The original files are never written to.
 
 pub mod log;
+pub mod recording;
 pub mod rig;
 pub mod settings;
-pub mod recording;

@@ -1,1 +1,5 @@
-//! Tests.
+//! What the tests across the crates share.
+
+mod skip;
+
+pub use skip::skip;

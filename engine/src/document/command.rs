@@ -217,10 +217,10 @@ impl Document {
                 next.stretch = None;
             }
             DocumentCommand::Stretch(stretch) => {
-                if let Some(Stretch { from_s, to_s }) = *stretch {
-                    if !from_s.is_finite() || !to_s.is_finite() || to_s <= from_s {
-                        return Err(DocumentError::EmptyStretch { from_s, to_s });
-                    }
+                if let Some(Stretch { from_s, to_s }) = *stretch
+                    && (!from_s.is_finite() || !to_s.is_finite() || to_s <= from_s)
+                {
+                    return Err(DocumentError::EmptyStretch { from_s, to_s });
                 }
                 next.stretch = *stretch;
             }
@@ -258,7 +258,8 @@ impl Document {
     fn check_setpoint(&self, tag: &str, level_cm: f64) -> Result<(), DocumentError> {
         let network = &self.rig.network;
         let loops = network.spec.configurations.iter().flat_map(|c| &c.loops);
-        let Some(sensor) = loops.into_iter().find(|l| l.id == tag).and_then(|l| network.sensor(&l.sensor)) else {
+        let Some(sensor) = loops.into_iter().find(|l| l.id == tag).and_then(|l| network.sensor(&l.sensor))
+        else {
             return Err(CommandError::UnknownTag { tag: tag.to_owned() }.into());
         };
         let rim_cm = network.tanks[network.sensors[sensor].tank].height_cm;

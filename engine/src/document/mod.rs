@@ -10,6 +10,8 @@ mod history;
 mod sync;
 
 pub use command::{DocumentCommand, DocumentError, NewModel};
-pub use data::{Candidate, Document, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings, SourceChoice, Stretch};
+pub use data::{
+    Candidate, Document, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings, SourceChoice, Stretch,
+};
 pub use history::History;
 pub use sync::{Consequence, rig_commands};

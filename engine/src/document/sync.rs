@@ -41,13 +41,11 @@ fn difference(before: &RigSettings, after: &RigSettings) -> Vec<RigCommand> {
     let spec = &after.network.spec;
     let mut angles = before.angles_deg.clone();
     let turned = before.configuration != after.configuration;
-    if turned {
-        if let Some(configuration) = spec.configurations.get(after.configuration) {
-            commands.push(RigCommand::Configuration { id: configuration.id.clone() });
-            for (id, &angle_deg) in &configuration.angles_deg {
-                if let Some(valve) = after.network.valve(id) {
-                    angles[valve] = angle_deg;
-                }
+    if turned && let Some(configuration) = spec.configurations.get(after.configuration) {
+        commands.push(RigCommand::Configuration { id: configuration.id.clone() });
+        for (id, &angle_deg) in &configuration.angles_deg {
+            if let Some(valve) = after.network.valve(id) {
+                angles[valve] = angle_deg;
             }
         }
     }

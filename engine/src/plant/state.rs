@@ -392,11 +392,11 @@ impl Plant {
             let head = valve.head_cm(&self.levels_cm);
             let mut head_rate = slope[valve.from];
             let mut conductance = 1.0 / self.network.tanks[valve.from].area_cm2;
-            if let Some(to) = valve.to {
-                if valve.drive == super::spec::ValveDrive::Between {
-                    head_rate -= slope[to];
-                    conductance += 1.0 / self.network.tanks[to].area_cm2;
-                }
+            if let Some(to) = valve.to
+                && valve.drive == super::spec::ValveDrive::Between
+            {
+                head_rate -= slope[to];
+                conductance += 1.0 / self.network.tanks[to].area_cm2;
             }
             if head == 0.0 && head_rate <= 0.0 && flow[i] == 0.0 && delta == 0.0 {
                 continue;

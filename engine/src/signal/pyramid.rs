@@ -28,7 +28,7 @@ impl Pyramid {
         self.values.push(value);
         let mut done = self.values.len();
         let mut level = 0;
-        while done % FAN == 0 {
+        while done.is_multiple_of(FAN) {
             done /= FAN;
             let merged = if level == 0 {
                 let start = self.values.len() - FAN;
@@ -97,15 +97,26 @@ impl Pyramid {
             level = Some(level.map_or(0, |l| l + 1));
             size *= FAN;
         }
-        let Some(level) = level else {
-            out.extend((first..last).map(|i| [self.time_s[i], self.values[i]]).filter(|p| !p[1].is_nan()));
-            return;
-        };
-        let blocks = &self.levels[level];
-        let start = first / size;
-        let end = (last / size).min(blocks.len());
-        for block in start..end {
-            let e = blocks[block];
+        // Blocks of the chosen size, then ever smaller ones up to the last sample.
+        let mut from = level.map_or(first, |_| first / size * size);
+        for level in (0..level.map_or(0, |l| l + 1)).rev() {
+            self.draw_blocks(level, size, from / size..last / size, out);
+            from = last / size * size;
+            size /= FAN;
+        }
+        out.extend((from..last).map(|i| [self.time_s[i], self.values[i]]).filter(|p| !p[1].is_nan()));
+    }
+
+    /// The extremes of some blocks of `size` samples, each inside the time of its block.
+    fn draw_blocks(
+        &self,
+        level: usize,
+        size: usize,
+        blocks: std::ops::Range<usize>,
+        out: &mut Vec<[f64; 2]>,
+    ) {
+        for block in blocks {
+            let e = self.levels[level][block];
             if e.min.is_nan() {
                 continue;
             }
@@ -117,11 +128,6 @@ impl Pyramid {
                 out.push([late, b]);
             }
         }
-        out.extend(
-            ((end * size).max(first)..last)
-                .map(|i| [self.time_s[i], self.values[i]])
-                .filter(|p| !p[1].is_nan()),
-        );
     }
 }
 
@@ -165,14 +171,25 @@ mod tests {
             p.draw(0.0, 20_000.0, pixels, &mut out);
             let (low, high) = out.iter().fold((0.0_f64, 0.0_f64), |(l, h), q| (l.min(q[1]), h.max(q[1])));
             assert_eq!((low, high), (-9.0, 9.0), "at {pixels} pixels");
-            assert!(
-                out.len() <= 100_000.min(34 * pixels.max(16)),
-                "{} points for {pixels} pixels",
-                out.len()
-            );
+            let most = 4 * pixels + 2 * FAN * p.levels.len();
+            assert!(out.len() <= most.min(100_000), "{} points for {pixels} pixels", out.len());
             assert!(out.windows(2).all(|w| w[0][0] <= w[1][0]), "time goes forward");
         }
         p.draw(100.0, 110.0, 500, &mut out);
         assert_eq!(out.len(), 52);
+    }
+
+    #[test]
+    fn no_peak_is_lost_at_any_place_of_a_signal_of_odd_length() {
+        let mut out = Vec::new();
+        for peak in 0..1003 {
+            let mut p = Pyramid::default();
+            for i in 0..1003 {
+                p.push(f64::from(i), f64::from(u8::from(i == peak)));
+            }
+            p.draw(0.0, 1003.0, 16, &mut out);
+            assert!(out.iter().any(|q| q[1] == 1.0), "peak at {peak}");
+            assert!(out.windows(2).all(|w| w[0][0] <= w[1][0]), "time goes forward");
+        }
     }
 }

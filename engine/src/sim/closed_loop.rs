@@ -147,10 +147,10 @@ impl ClosedLoop {
         for active in &mut self.loops {
             let output = active.control.update(self.readings[active.sensor].level_cm);
             active.held = output.held;
-            if let Ok(written) = self.source.write(active.pump, output.mv) {
-                if written != output.mv {
-                    active.control.set_mv(written);
-                }
+            if let Ok(written) = self.source.write(active.pump, output.mv)
+                && written != output.mv
+            {
+                active.control.set_mv(written);
             }
         }
         self.fill_row();

@@ -47,7 +47,7 @@ impl Behaviour {
         let ever_moves = table.columns.iter().map(|c| moves(&c.values)).collect();
         let motion = table.columns.iter().zip(&columns).zip(&range).map(|((full, thin), range)| {
             if range[1] - range[0] <= 1e-9 * range[1].abs().max(1e-30) {
-                let away = thin.iter().filter(|v| !(range[0]..=range[1]).contains(v)).count();
+                let away = thin.iter().filter(|v| !(range[0]..=range[1]).contains(*v)).count();
                 let stepped = away > LONE_ROWS || thin.first() != thin.last();
                 return if stepped { Motion::Steps } else { Motion::Still };
             }

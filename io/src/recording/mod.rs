@@ -1,9 +1,242 @@
-//! Stub.
-#![allow(missing_docs)]
-use std::path::Path;
-pub struct Recording; #[derive(Default)] pub struct RecordingOptions{pub serve:bool,pub port:Option<u16>}
-#[derive(Debug,thiserror::Error)] #[error("x")] pub struct RecordingTrouble;
-impl vasos_engine::explain::Explain for RecordingTrouble { fn key(&self)->&'static str{"x"} fn args(&self)->Vec<(&'static str,String)>{vec![]} }
-impl Recording { pub fn start(_p:&Path,_o:RecordingOptions)->Result<(Self,Box<dyn vasos_engine::session::Sink>),RecordingTrouble>{Err(RecordingTrouble)}
- pub fn id(&self)->u64{0} pub fn path(&self)->&Path{Path::new("")} pub fn address(&self)->Option<&str>{None} pub fn rows(&self)->u64{0} pub fn lost(&self)->u64{0} pub fn bytes(&self)->u64{0}
- pub fn troubles(&mut self)->Vec<RecordingTrouble>{vec![]} pub fn close(self)->Result<(),RecordingTrouble>{Ok(())} }
+//! Recordings: every run goes to a `.rrd` file while it happens, and to viewers that join over the loopback.
+//!
+//! [`Recording::start`] gives a handle and a [`Sink`] to attach to a session. The sink copies into a bounded queue and
+//! never waits; the thread `vasos-recorder` logs batches of about a second. The file comes first: a viewer that is
+//! absent, slow or killed cannot hold it up, and a full disk costs the batches that do not fit, nothing else.
+//! Each run (a session's run number) is a recording of its own in the one file, named `file · rig · run n`, so that
+//! `time` starts at 0 in each; the viewer lists them side by side.
+//!
+//! | entity | archetype | values, in this order | unit | how often |
+//! | --- | --- | --- | --- | --- |
+//! | `/loops/N`, N from 1 | `Scalars` | SP, PV, MV of loop slot N | cm, cm, the pump's unit | every sample |
+//! | `/levels` | `Scalars` | true level of each tank | cm | every sample |
+//! | `/flows` | `Scalars` | for each pump its input and arriving flow, each valve its flow and angle, each tank its spill | pump's unit, cm³/s, cm³/s, °, cm³/s | every sample |
+//! | `/events` | `TextLog` | what happened, with level | – | as it happens |
+//! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, when a level moves |
+//! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
+//! | `/__properties/vasos` | – | `rig`, `run`, `program` | – | once |
+//!
+//! | timeline | kind | what it is |
+//! | --- | --- | --- |
+//! | `time` | duration | time of the run |
+//! | `wall_clock` | timestamp | the computer's clock when the row came out of the session |
+//!
+//! The names of the values are static (`SeriesLines`): the columns of [`vasos_engine::signal::ChannelSet`] with their
+//! units in brackets. A value that does not exist, such as the PV before the first sample, is NaN.
+
+mod layout;
+mod output;
+mod read;
+mod run_sink;
+mod status;
+mod tanks;
+mod trouble;
+mod words;
+mod writer;
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, bounded};
+use rerun::grpc_server::GrpcServerSink;
+use rerun::{MemoryLimit, ServerOptions};
+use vasos_engine::session::Sink;
+
+pub use layout::{EVENTS, FLOWS, LEVELS, RIG, TIME, WALL_CLOCK};
+pub use read::{RecordedColumn, read_recording};
+pub use trouble::{RecordingError, RecordingTrouble};
+
+use output::Output;
+use run_sink::RunSink;
+use status::Status;
+use writer::Writer;
+
+/// Blocks and events that wait for the recorder before rows are lost.
+const QUEUE: usize = 4096;
+/// What the server keeps for viewers that join later.
+const SERVER_BYTES: u64 = 128 * 1024 * 1024;
+/// A file larger than this is not optimised: that takes it into memory as a whole.
+const OPTIMISE_BYTES: u64 = 32 * 1024 * 1024;
+/// Longest wait of [`Recording::close`].
+const CLOSE_LIMIT: Duration = Duration::from_secs(5);
+/// Rerun's own port, which viewers try first.
+const USUAL_PORT: u16 = 9876;
+
+/// How to record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordingOptions {
+    /// Let viewers of this computer join the run.
+    pub serve: bool,
+    /// Port for them; `None` tries Rerun's own, 9876, then any free one.
+    pub port: Option<u16>,
+}
+
+impl Default for RecordingOptions {
+    fn default() -> Self {
+        Self { serve: true, port: None }
+    }
+}
+
+/// A recording that runs; dropping it without [`Recording::close`] leaves the file complete but not optimised.
+pub struct Recording {
+    id: u64,
+    path: PathBuf,
+    address: Option<String>,
+    status: Arc<Status>,
+    done: Receiver<()>,
+    lost_reported: u64,
+    behind_reported: u64,
+}
+
+impl Recording {
+    /// Creates the file and starts the recorder; attach the sink to a session under [`Recording::id`].
+    ///
+    /// An existing file of that name is replaced. A server that cannot start is a trouble, not an error.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when the file or a thread cannot be made.
+    pub fn start(path: &Path, options: RecordingOptions) -> Result<(Self, Box<dyn Sink>), RecordingError> {
+        let shown = path.display().to_string();
+        let status = Arc::new(Status::new(shown.clone()));
+        let mut output = Output::create(path, status.clone())
+            .map_err(|reason| RecordingError::Create { path: shown, reason })?;
+        let mut address = None;
+        if options.serve {
+            match serve(&mut output, options.port) {
+                Ok(at) => address = Some(at),
+                Err(reason) => status.report(RecordingTrouble::NoServer { reason }),
+            }
+        }
+        let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let (queue, messages) = bounded(QUEUE);
+        let (said, done) = bounded::<()>(0);
+        let writer = Writer::new(messages, output, status.clone(), name);
+        let spawned = std::thread::Builder::new().name("vasos-recorder".to_owned()).spawn(move || {
+            writer.record();
+            drop(said);
+        });
+        spawned.map_err(|error| RecordingError::Start { reason: error.to_string() })?;
+        let sink = Box::new(RunSink { queue, status: status.clone() });
+        let id = output::next_id();
+        let path = path.to_owned();
+        Ok((Self { id, path, address, status, done, lost_reported: 0, behind_reported: 0 }, sink))
+    }
+
+    /// Number unique in this process, for attaching and detaching the sink.
+    #[must_use]
+    pub fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where a viewer joins: `rerun --connect ADDRESS`; `None` without a server.
+    #[must_use]
+    pub fn address(&self) -> Option<&str> {
+        self.address.as_deref()
+    }
+
+    /// Rows handed to the recorder.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.status.rows.load(Ordering::Relaxed)
+    }
+
+    /// Rows that the recorder could not take.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.status.lost.load(Ordering::Relaxed)
+    }
+
+    /// Size of the file now, in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.status.bytes.load(Ordering::Relaxed)
+    }
+
+    /// What went wrong since the last call.
+    pub fn troubles(&mut self) -> Vec<RecordingTrouble> {
+        let mut troubles = self.status.take_troubles();
+        let lost = self.lost();
+        if lost > self.lost_reported {
+            troubles.push(RecordingTrouble::RowsLost { count: lost - self.lost_reported });
+            self.lost_reported = lost;
+        }
+        let behind = self.status.behind.load(Ordering::Relaxed);
+        if behind > self.behind_reported {
+            troubles.push(RecordingTrouble::ViewerBehind { count: behind - self.behind_reported });
+            self.behind_reported = behind;
+        }
+        troubles
+    }
+
+    /// Ends the recording: the rows under way are written, the file is made final, and a file of moderate size is
+    /// optimised. Detach the sink first, or rows of the next second are still taken. Waits at most five seconds for
+    /// the recorder, whatever viewers do.
+    ///
+    /// # Errors
+    /// [`RecordingTrouble::NotClosed`] when the disk does not answer in time, or the last write error.
+    pub fn close(mut self) -> Result<(), RecordingTrouble> {
+        self.status.closing.store(true, Ordering::Relaxed);
+        let path = || self.path.display().to_string();
+        if self.done.recv_timeout(CLOSE_LIMIT) == Err(crossbeam_channel::RecvTimeoutError::Timeout) {
+            return Err(RecordingTrouble::NotClosed { path: path(), seconds: CLOSE_LIMIT.as_secs() });
+        }
+        let unwritten = |t: &RecordingTrouble| {
+            matches!(t, RecordingTrouble::Write { .. } | RecordingTrouble::Resumed { .. })
+        };
+        if let Some(trouble) = self.troubles().into_iter().rfind(unwritten) {
+            return Err(trouble);
+        }
+        if self.bytes() <= OPTIMISE_BYTES {
+            optimise(&self.path);
+        }
+        Ok(())
+    }
+}
+
+/// Starts a server on the loopback and gives the address for viewers.
+fn serve(output: &mut Output, port: Option<u16>) -> Result<String, String> {
+    let free = |port: u16| TcpListener::bind((Ipv4Addr::LOCALHOST, port)).and_then(|l| l.local_addr());
+    let bound = match port {
+        Some(port) => free(port),
+        None => free(USUAL_PORT).or_else(|_| free(0)),
+    };
+    let port = bound.map_err(|error| error.to_string())?.port();
+    let options =
+        ServerOptions { memory_limit: MemoryLimit::from_bytes(SERVER_BYTES), ..ServerOptions::default() };
+    let server = GrpcServerSink::new("127.0.0.1", port, options).map_err(|error| error.to_string())?;
+    let address = server.uri().to_string();
+    output.serve(server)?;
+    // The server binds on a thread of its own and says nothing when it cannot.
+    let limit = Instant::now() + Duration::from_secs(2);
+    while std::net::TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_err() {
+        if Instant::now() > limit {
+            return Err(format!("nothing answers on port {port}"));
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    Ok(address)
+}
+
+/// Rewrites a finished file with larger chunks and a footer; on any doubt it stays as it is.
+fn optimise(path: &Path) {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".optimising");
+    let beside = PathBuf::from(beside);
+    let profile = rerun::rrd::OptimizationProfile::OBJECT_STORE;
+    let better = rerun::rrd::optimize_file(path, &beside, &profile).is_ok() && {
+        let size = |p: &Path| std::fs::metadata(p).map_or(0, |m| m.len());
+        (1..=size(path)).contains(&size(&beside))
+    };
+    if !(better && std::fs::rename(&beside, path).is_ok()) {
+        drop(std::fs::remove_file(&beside));
+    }
+}

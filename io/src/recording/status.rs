@@ -1,0 +1,56 @@
+//! What a recorder says of itself, shared between its threads and its handle.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use super::trouble::RecordingTrouble;
+
+/// Troubles kept for a handle that does not ask.
+const MOST_TROUBLES: usize = 100;
+
+#[derive(Default)]
+pub(super) struct Status {
+    /// File, as shown in sentences.
+    pub path: String,
+    /// Rows handed to the recorder.
+    pub rows: AtomicU64,
+    /// Rows it could not take.
+    pub lost: AtomicU64,
+    /// Bytes of the file.
+    pub bytes: AtomicU64,
+    /// Messages no viewer got.
+    pub behind: AtomicU64,
+    /// The handle wants the recorder to end.
+    pub closing: AtomicBool,
+    writing_fails: AtomicBool,
+    troubles: Mutex<Vec<RecordingTrouble>>,
+}
+
+impl Status {
+    pub fn new(path: String) -> Self {
+        Self { path, ..Self::default() }
+    }
+
+    pub fn report(&self, trouble: RecordingTrouble) {
+        let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
+        if troubles.len() < MOST_TROUBLES && !troubles.contains(&trouble) {
+            troubles.push(trouble);
+        }
+    }
+
+    /// Says once that the file takes no data, until it does again.
+    pub fn report_write(&self, reason: &str) {
+        if !self.writing_fails.swap(true, Ordering::Relaxed) {
+            self.report(RecordingTrouble::Write { path: self.path.clone(), reason: reason.to_owned() });
+        }
+    }
+
+    pub fn report_resumed(&self, count: u64) {
+        self.writing_fails.store(false, Ordering::Relaxed);
+        self.report(RecordingTrouble::Resumed { path: self.path.clone(), count });
+    }
+
+    pub fn take_troubles(&self) -> Vec<RecordingTrouble> {
+        std::mem::take(&mut *self.troubles.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}

@@ -1,0 +1,240 @@
+//! The recorder's thread: rows are gathered for about a second and logged as columns.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError};
+use rerun::blueprint::BlueprintActivation;
+use rerun::{Boxes2D, RecordingStream, RecordingStreamBuilder, Scalars, TextLog, TimeColumn};
+use vasos_engine::plant::Network;
+use vasos_engine::session::Event;
+use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
+
+use super::layout::{EVENTS, Group, RIG, TIME, WALL_CLOCK, blueprint, groups};
+use super::output::Output;
+use super::run_sink::Message;
+use super::status::Status;
+use super::tanks::Tanks;
+use super::trouble::RecordingTrouble;
+use super::words;
+
+/// Wall time between two batches.
+const BATCH: Duration = Duration::from_secs(1);
+/// Rows that make a batch before its time.
+const MOST_ROWS: usize = 10_000;
+/// Frames of the drawing in a batch.
+const MOST_FRAMES: usize = 5;
+/// How long a closing recorder waits for its sink to be let go.
+const LAST_ROWS: Duration = Duration::from_secs(1);
+
+type LogResult = Result<(), Box<dyn std::error::Error>>;
+
+/// What one run needs.
+struct Run {
+    stream: RecordingStream,
+    channels: Arc<ChannelSet>,
+    groups: Vec<Group>,
+    levels: Vec<usize>,
+    tanks: Tanks,
+}
+
+pub(super) struct Writer {
+    queue: Receiver<Message>,
+    output: Output,
+    status: Arc<Status>,
+    name: String,
+    run: Option<Run>,
+    time_s: Vec<f64>,
+    wall_ns: Vec<i64>,
+    values: Vec<f64>,
+    events: Vec<(Event, i64)>,
+}
+
+impl Writer {
+    pub fn new(queue: Receiver<Message>, output: Output, status: Arc<Status>, name: String) -> Self {
+        let (time_s, wall_ns, values) = (vec![], vec![], vec![]);
+        Self { queue, output, status, name, run: None, time_s, wall_ns, values, events: vec![] }
+    }
+
+    /// Records until the sink is gone, or the handle closes.
+    pub fn record(mut self) {
+        let mut due = Instant::now() + BATCH;
+        let mut close_by: Option<Instant> = None;
+        loop {
+            let wait = due.saturating_duration_since(Instant::now()).min(Duration::from_millis(100));
+            match self.queue.recv_timeout(wait) {
+                Ok(message) => self.take(message),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if Instant::now() >= due || self.time_s.len() >= MOST_ROWS {
+                self.flush();
+                due = Instant::now() + BATCH;
+            }
+            if self.status.closing.load(Ordering::Relaxed) {
+                let limit = *close_by.get_or_insert_with(|| Instant::now() + LAST_ROWS);
+                if Instant::now() >= limit {
+                    break;
+                }
+            }
+        }
+        self.flush();
+        self.run = None;
+        self.output.finish();
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Run { run, network, channels } => {
+                self.flush();
+                if let Err(error) = self.begin(run, &network, channels) {
+                    self.report(&*error);
+                }
+            }
+            Message::Rows { block, wall } => self.gather(&block, wall),
+            Message::Event { event, wall } => self.events.push((event, nanoseconds(wall))),
+        }
+    }
+
+    fn gather(&mut self, block: &SampleBlock, wall: SystemTime) {
+        let known = self.run.as_ref().is_some_and(|run| run.channels == block.channels);
+        if !known {
+            self.status.lost.fetch_add(block.time_s.len() as u64, Ordering::Relaxed);
+            return;
+        }
+        self.time_s.extend_from_slice(&block.time_s);
+        self.wall_ns.resize(self.time_s.len(), nanoseconds(wall));
+        self.values.extend_from_slice(&block.values);
+    }
+
+    /// Opens a recording for a run, in the same file.
+    fn begin(&mut self, number: u64, network: &Arc<Network>, channels: Arc<ChannelSet>) -> LogResult {
+        self.run = None;
+        let id = &network.spec.id;
+        let stream = RecordingStreamBuilder::new("vasos")
+            .enabled(true)
+            .recording_name(format!("{} · {id} · run {}", self.name, number + 1))
+            .buffered()?;
+        stream.set_sink(Box::new(self.output.clone()));
+        let groups = groups(&channels, network);
+        let activation = BlueprintActivation { make_active: true, make_default: true };
+        blueprint(&groups).send(&stream, activation)?;
+        for group in &groups {
+            stream.log_static(group.path.as_str(), &group.series(&group.shown))?;
+        }
+        let tanks = Tanks::new(network);
+        stream.log_static(format!("{RIG}/walls"), &tanks.walls(network))?;
+        stream.log_static(format!("{RIG}/pipes"), &tanks.pipes(network))?;
+        stream.log_static(format!("{RIG}/water"), &Tanks::water_style())?;
+        let about = rerun::AnyValues::default()
+            .with_component::<rerun::components::Text>("rig", [id.as_str()])
+            .with_component::<rerun::components::Text>("run", [number.to_string()])
+            .with_component::<rerun::components::Text>("program", ["Vasos"]);
+        stream.send_property("vasos", &about)?;
+        let column = |tank| channels.column(ChannelKind::Level(tank));
+        let levels = (0..network.tanks.len()).filter_map(column).collect();
+        stream.flush_with_timeout(BATCH)?;
+        self.run = Some(Run { stream, channels, groups, levels, tanks });
+        Ok(())
+    }
+
+    /// Logs what has been gathered.
+    fn flush(&mut self) {
+        if let Some(run) = &mut self.run {
+            let rows = Rows { time_s: &self.time_s, wall_ns: &self.wall_ns, values: &self.values };
+            let logged = run.log_rows(&rows).and_then(|()| run.log_events(&self.events));
+            let flushed = logged.and_then(|()| Ok(run.stream.flush_with_timeout(5 * BATCH)?));
+            if let Err(error) = flushed {
+                self.report(&*error);
+            }
+            self.events.clear();
+        }
+        self.time_s.clear();
+        self.wall_ns.clear();
+        self.values.clear();
+    }
+
+    fn report(&self, error: &dyn std::error::Error) {
+        self.status.report(RecordingTrouble::Log { reason: error.to_string() });
+    }
+}
+
+struct Rows<'a> {
+    time_s: &'a [f64],
+    wall_ns: &'a [i64],
+    values: &'a [f64],
+}
+
+impl Run {
+    fn log_rows(&mut self, rows: &Rows) -> LogResult {
+        if rows.time_s.is_empty() {
+            return Ok(());
+        }
+        let width = self.channels.len();
+        let count = rows.time_s.len();
+        let time = TimeColumn::new_duration_secs(TIME, rows.time_s.iter().copied());
+        let wall = TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, rows.wall_ns.iter().copied());
+        for group in &self.groups {
+            let scalars = rows.values.chunks(width).flat_map(|row| group.columns.iter().map(|&c| row[c]));
+            let lengths = std::iter::repeat_n(group.columns.len(), count);
+            let columns = Scalars::new(scalars).columns(lengths)?;
+            self.stream.send_columns(group.path.as_str(), [time.clone(), wall.clone()], columns)?;
+        }
+        self.log_water(rows)
+    }
+
+    /// A few frames of the drawing, evenly spaced over the batch, where a level has moved.
+    fn log_water(&mut self, rows: &Rows) -> LogResult {
+        let width = self.channels.len();
+        let count = rows.time_s.len();
+        // At real time a frame a second is smooth enough for water.
+        let frames = if count <= 2 * MOST_FRAMES { 1 } else { MOST_FRAMES };
+        let (mut time_s, mut wall_ns) = (vec![], vec![]);
+        let (mut centers, mut halves, mut radii, mut lengths) = (vec![], vec![], vec![], vec![]);
+        for frame in 1..=frames {
+            let row = frame * count / frames - 1;
+            let values = &rows.values[row * width..(row + 1) * width];
+            let levels: Vec<f32> = self.levels.iter().map(|&c| values[c] as f32).collect();
+            if !self.tanks.moved(&levels) {
+                continue;
+            }
+            let water = self.tanks.frame(&levels);
+            time_s.push(rows.time_s[row]);
+            wall_ns.push(rows.wall_ns[row]);
+            lengths.push(water.len());
+            for part in water {
+                centers.push(part.center);
+                halves.push(part.half);
+                radii.push(part.radius);
+            }
+        }
+        if time_s.is_empty() {
+            return Ok(());
+        }
+        let times = [
+            TimeColumn::new_duration_secs(TIME, time_s),
+            TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, wall_ns),
+        ];
+        let boxes = Boxes2D::update_fields().with_centers(centers).with_half_sizes(halves).with_radii(radii);
+        Ok(self.stream.send_columns(format!("{RIG}/water"), times, boxes.columns(lengths)?)?)
+    }
+
+    fn log_events(&self, events: &[(Event, i64)]) -> LogResult {
+        if events.is_empty() {
+            return Ok(());
+        }
+        let (levels, texts): (Vec<_>, Vec<_>) = events.iter().map(|(e, _)| words::line(&e.kind)).unzip();
+        let times = [
+            TimeColumn::new_duration_secs(TIME, events.iter().map(|(e, _)| e.time_s)),
+            TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, events.iter().map(|(_, w)| *w)),
+        ];
+        let columns = TextLog::update_fields().with_many_text(texts).with_many_level(levels);
+        Ok(self.stream.send_columns(EVENTS, times, columns.columns_of_unit_batches()?)?)
+    }
+}
+
+fn nanoseconds(wall: SystemTime) -> i64 {
+    let since = wall.duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
