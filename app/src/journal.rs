@@ -60,9 +60,9 @@ pub fn of_event(event: &Event) -> Entry {
         EventKind::Paused => (Weight::Note, tr!("event.paused"), None),
         EventKind::Done(command) => {
             let thread = match command {
-                RigCommand::Valve { tag, .. } | RigCommand::Setpoint { tag, .. } | RigCommand::Mv { tag, .. } => {
-                    Some(format!("{:?} {tag}", std::mem::discriminant(command)))
-                }
+                RigCommand::Valve { tag, .. }
+                | RigCommand::Setpoint { tag, .. }
+                | RigCommand::Mv { tag, .. } => Some(format!("{:?} {tag}", std::mem::discriminant(command))),
                 _ => None,
             };
             (Weight::Note, done(command), thread)
@@ -108,7 +108,9 @@ fn done(command: &RigCommand) -> String {
         RigCommand::PvFilter { tag, time_constant_s } => {
             tr!("event.pv_filter", tag = tag, filter = text::brief(*time_constant_s))
         }
-        RigCommand::Valve { tag, angle_deg } => tr!("event.valve", tag = tag, angle = text::fixed(*angle_deg, 1)),
+        RigCommand::Valve { tag, angle_deg } => {
+            tr!("event.valve", tag = tag, angle = text::fixed(*angle_deg, 1))
+        }
         RigCommand::Bump { tag, delta_cm } => tr!("event.bump", tag = tag, delta = text::fixed(*delta_cm, 1)),
         RigCommand::Configuration { id } => tr!("event.configuration", id = id),
         RigCommand::SteadyAt { tag, level_cm } => {
@@ -116,7 +118,11 @@ fn done(command: &RigCommand) -> String {
         }
         RigCommand::Measurement { measurement } => {
             let word = |on: bool| if on { tr!("state.on") } else { tr!("state.off") };
-            tr!("event.measurement", noise = word(measurement.noise), quantisation = word(measurement.quantisation))
+            tr!(
+                "event.measurement",
+                noise = word(measurement.noise),
+                quantisation = word(measurement.quantisation)
+            )
         }
         RigCommand::Seed { seed } => tr!("event.seed", seed = seed),
     }

@@ -2,7 +2,10 @@
 //!
 //! After ISA-101: a grey field, muted equipment, saturated colour for what is abnormal only.
 
-use eframe::egui::{self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Stroke, TextStyle, vec2};
+use eframe::egui::{
+    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Stroke, TextStyle,
+    vec2,
+};
 
 /// Gap between things that belong together.
 pub const GAP: f32 = 6.0;
@@ -176,7 +179,8 @@ pub fn install(ctx: &egui::Context) {
         fonts.font_data.insert(name.to_owned(), FontData::from_static(bytes).into());
     }
     let fallback = fonts.families.get(&FontFamily::Proportional).cloned().unwrap_or_default();
-    let family = |first: &str| std::iter::once(first.to_owned()).chain(fallback.iter().cloned()).collect::<Vec<_>>();
+    let family =
+        |first: &str| std::iter::once(first.to_owned()).chain(fallback.iter().cloned()).collect::<Vec<_>>();
     fonts.families.insert(bold(), family("plex-bold"));
     fonts.families.insert(FontFamily::Proportional, family("plex"));
     ctx.set_fonts(fonts);
@@ -259,12 +263,30 @@ mod tests {
     #[test]
     fn every_text_stands_out_from_what_is_behind_it() {
         for (name, p) in [("dark", DARK), ("light", LIGHT)] {
-            let grounds = [("pane", p.pane), ("well", p.well), ("field", p.field), ("button", p.button), ("row", p.row), ("hover", p.button_hover)];
-            let inks = [("text", p.text), ("weak", p.weak), ("accent", p.accent_text), ("pv", p.pv), ("sp", p.sp), ("mv", p.mv), ("caution", p.caution)];
+            let grounds = [
+                ("pane", p.pane),
+                ("well", p.well),
+                ("field", p.field),
+                ("button", p.button),
+                ("row", p.row),
+                ("hover", p.button_hover),
+            ];
+            let inks = [
+                ("text", p.text),
+                ("weak", p.weak),
+                ("accent", p.accent_text),
+                ("pv", p.pv),
+                ("sp", p.sp),
+                ("mv", p.mv),
+                ("caution", p.caution),
+            ];
             for (ground_name, ground) in grounds {
                 for (ink_name, ink) in inks {
                     // Coloured and weak text never stands on a hovered button or a chosen row.
-                    if ink_name != "text" && matches!(ground_name, "hover" | "row" | "button" | "field") && ink_name != "weak" {
+                    if ink_name != "text"
+                        && matches!(ground_name, "hover" | "row" | "button" | "field")
+                        && ink_name != "weak"
+                    {
                         continue;
                     }
                     let c = contrast(ink, ground);

@@ -59,8 +59,12 @@ impl RunTrace {
             self.columns.iter_mut().for_each(Pyramid::clear);
         }
         let words = match &event.kind {
-            EventKind::Done(RigCommand::Valve { tag, angle_deg }) => format!("{tag} {}°", crate::text::brief(*angle_deg)),
-            EventKind::Done(RigCommand::Bump { tag, delta_cm }) => format!("{tag} {} cm", crate::text::fixed(*delta_cm, 1)),
+            EventKind::Done(RigCommand::Valve { tag, angle_deg }) => {
+                format!("{tag} {}°", crate::text::brief(*angle_deg))
+            }
+            EventKind::Done(RigCommand::Bump { tag, delta_cm }) => {
+                format!("{tag} {} cm", crate::text::fixed(*delta_cm, 1))
+            }
             EventKind::Done(RigCommand::Configuration { id }) => id.clone(),
             EventKind::Done(RigCommand::Tuning { tag, tuning }) => {
                 format!("{tag} Kc {}", crate::text::brief(tuning.gains.kc))

@@ -87,7 +87,8 @@ impl TuningTable {
         }
         for rule in registry() {
             for &kind in rule.controllers {
-                let options = RuleOptions { tau_c_s: document.tau_c_s.get(rule.id).copied(), ..RuleOptions::default() };
+                let options =
+                    RuleOptions { tau_c_s: document.tau_c_s.get(rule.id).copied(), ..RuleOptions::default() };
                 self.apply(&entry.model, &old, rule, kind, &options);
             }
         }

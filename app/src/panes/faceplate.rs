@@ -1,6 +1,6 @@
 //! The faceplate of a loop: PV, SP and MV on bars, mode, keys, tuning in use, alarms.
 
-use eframe::egui::{self, Align2, Color32, FontId, Rect, Sense, Stroke, WidgetInfo, Role, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, FontId, Rect, Role, Sense, Stroke, WidgetInfo, pos2, vec2};
 use vasos_engine::control::Mode;
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{LoopNow, RigCommand};
@@ -93,7 +93,11 @@ fn bar(ui: &egui::Ui, well: Rect, share: f32, colour: Color32, p: &theme::Palett
     ui.painter().rect(well, 2.0, p.well, Stroke::new(1.0, p.edge), egui::StrokeKind::Inside);
     let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
     let top = well.bottom() - share * well.height();
-    ui.painter().rect_filled(Rect::from_min_max(pos2(well.left() + 1.0, top), well.max - vec2(1.0, 1.0)), 1.0, colour);
+    ui.painter().rect_filled(
+        Rect::from_min_max(pos2(well.left() + 1.0, top), well.max - vec2(1.0, 1.0)),
+        1.0,
+        colour,
+    );
     for tick in 1..4 {
         let y = well.bottom() - well.height() * tick as f32 / 4.0;
         ui.painter().hline(well.left()..=well.left() + 4.0, y, Stroke::new(1.0, p.weak));
@@ -142,7 +146,8 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
         let width = (ui.available_width() - 9.0) / 4.0;
         for percent in [-10.0, -1.0, 1.0, 10.0] {
             let sign = if percent > 0.0 { "+" } else { "−" };
-            let key = egui::Button::new(format!("{sign}{} %", f64::abs(percent))).min_size(vec2(width, theme::PRESS));
+            let key = egui::Button::new(format!("{sign}{} %", f64::abs(percent)))
+                .min_size(vec2(width, theme::PRESS));
             let key = ui.add_sized([width, theme::PRESS], key).on_hover_text(tr!("faceplate.keys_hint"));
             if key.clicked() {
                 actions.push(set(value + percent / 100.0 * (high - low)));
@@ -164,16 +169,19 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let mut filter_changed = false;
     let mut done = false;
     egui::Grid::new("tuning").num_columns(4).spacing([5.0, 3.0]).show(ui, |ui| {
-        let mut field = |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
-            let name = ui.label(name).on_hover_text(&hint);
-            let drag = egui::DragValue::new(value).speed(speed).max_decimals(3).suffix(suffix);
-            let response = ui.add_sized([74.0, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
-            done |= response.drag_stopped() || response.lost_focus();
-            response.changed()
-        };
+        let mut field =
+            |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
+                let name = ui.label(name).on_hover_text(&hint);
+                let drag = egui::DragValue::new(value).speed(speed).max_decimals(3).suffix(suffix);
+                let response = ui.add_sized([74.0, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
+                done |= response.drag_stopped() || response.lost_focus();
+                response.changed()
+            };
         let speed = |v: f64| (v.abs() / 100.0).max(0.001);
-        changed |= field(ui, "Kc", tr!("gain.kc"), &mut edited.gains.kc, format!(" {unit}/cm"), speed(gains.kc));
-        changed |= field(ui, "Ti", tr!("gain.ti"), &mut edited.gains.ti_s, " s".to_owned(), speed(gains.ti_s));
+        changed |=
+            field(ui, "Kc", tr!("gain.kc"), &mut edited.gains.kc, format!(" {unit}/cm"), speed(gains.kc));
+        changed |=
+            field(ui, "Ti", tr!("gain.ti"), &mut edited.gains.ti_s, " s".to_owned(), speed(gains.ti_s));
         ui.end_row();
         changed |= field(ui, "Td", tr!("gain.td"), &mut edited.gains.td_s, " s".to_owned(), 0.01);
         changed |= field(ui, "N", tr!("gain.n"), &mut edited.gains.n, String::new(), 0.1);
@@ -205,7 +213,9 @@ fn alarms(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
         any = true;
         let words = tr!(&format!("alarm.{}", alarm.key()), tag = alarm.tag());
         egui::Frame::NONE.fill(p.alarm).corner_radius(3).inner_margin(4).show(ui, |ui| {
-            ui.add(egui::Label::new(egui::RichText::new(format!("! {words}")).color(p.on_alarm).small()).wrap());
+            ui.add(
+                egui::Label::new(egui::RichText::new(format!("! {words}")).color(p.on_alarm).small()).wrap(),
+            );
         });
     }
     if !any {

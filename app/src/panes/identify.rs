@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, Plot, PlotPoints};
-use vasos_engine::document::{Document, DocumentCommand, ModelEntry, ModelOrigin, NewModel, SourceChoice, Stretch};
+use vasos_engine::document::{
+    Document, DocumentCommand, ModelEntry, ModelOrigin, NewModel, SourceChoice, Stretch,
+};
 use vasos_engine::identify::{FitOptions, FitProblem, fit_fopdt};
 use vasos_engine::model::{Fopdt, ProcessModel};
 use vasos_engine::signal::ChannelKind;
@@ -102,8 +104,10 @@ fn of_run(document: &Document, run: &RunTrace, stretch: Stretch) -> Result<FitDa
     let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s);
     let active = document.rig.active_loops().first();
     let spec = &document.rig.network.spec;
-    let unit = active.and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump)).map_or("", |p| p.unit.symbol());
-    let whole: Vec<usize> = range.filter(|&i| pv.values()[i].is_finite() && mv.values()[i].is_finite()).collect();
+    let unit =
+        active.and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump)).map_or("", |p| p.unit.symbol());
+    let whole: Vec<usize> =
+        range.filter(|&i| pv.values()[i].is_finite() && mv.values()[i].is_finite()).collect();
     let take = |values: &[f64]| whole.iter().map(|&i| values[i]).collect::<Vec<f64>>();
     let time_s = take(pv.time_s());
     let stretch = Stretch {
@@ -134,7 +138,9 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             verdict(ui, entry);
             overlay(ui, view, entry);
         } else {
-            ui.add(egui::Label::new(RichText::new(tr!("identify.hint")).color(theme::palette(ui).weak)).wrap());
+            ui.add(
+                egui::Label::new(RichText::new(tr!("identify.hint")).color(theme::palette(ui).weak)).wrap(),
+            );
         }
     });
     actions
@@ -189,7 +195,13 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let units = latest.map_or(String::new(), gain_unit);
     egui::ScrollArea::horizontal().id_salt("models").show(ui, |ui| {
         egui::Grid::new("models").striped(true).spacing([10.0, 3.0]).show(ui, |ui| {
-            for title in [tr!("identify.model"), format!("K {units}"), "T [s]".to_owned(), "L [s]".to_owned(), tr!("identify.fit_percent")] {
+            for title in [
+                tr!("identify.model"),
+                format!("K {units}"),
+                "T [s]".to_owned(),
+                "L [s]".to_owned(),
+                tr!("identify.fit_percent"),
+            ] {
                 ui.label(RichText::new(title).size(theme::SMALL).color(p.weak));
             }
             ui.end_row();
@@ -245,12 +257,16 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
 }
 
 fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<Action>) {
-    let loop_unit = view.snapshot.loops.first().map_or("", |l| view.snapshot.network.spec.pumps[l.pump].unit.symbol());
+    let loop_unit =
+        view.snapshot.loops.first().map_or("", |l| view.snapshot.network.spec.pumps[l.pump].unit.symbol());
     ui.horizontal_wrapped(|ui| {
         let [k, t, l] = &mut state.typed;
-        for (name, value, suffix) in [("K", k, format!(" cm/{loop_unit}")), ("T", t, " s".to_owned()), ("L", l, " s".to_owned())] {
+        for (name, value, suffix) in
+            [("K", k, format!(" cm/{loop_unit}")), ("T", t, " s".to_owned()), ("L", l, " s".to_owned())]
+        {
             let name = ui.label(name);
-            ui.add(egui::DragValue::new(value).speed(0.05).max_decimals(4).suffix(suffix)).labelled_by(name.id);
+            ui.add(egui::DragValue::new(value).speed(0.05).max_decimals(4).suffix(suffix))
+                .labelled_by(name.id);
         }
         let model = Fopdt::new(state.typed[0], state.typed[1], state.typed[2]);
         if ui.add_enabled(model.is_ok(), egui::Button::new(tr!("identify.add"))).clicked() {
@@ -309,7 +325,9 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
         .legend(egui_plot::Legend::default().position(egui_plot::Corner::RightBottom))
         .show(ui, |plot| {
             plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
-            plot.line(Line::new(tr!("identify.model"), points(&fit.simulated)).color(p.pv).width(theme::LINE));
+            plot.line(
+                Line::new(tr!("identify.model"), points(&fit.simulated)).color(p.pv).width(theme::LINE),
+            );
         });
 }
 
@@ -319,13 +337,18 @@ fn fitted_data(view: &View, entry: &ModelEntry) -> Option<(Vec<f64>, Vec<f64>)> 
         ModelOrigin::Run { stretch, .. } => {
             let (pv, mv) = (view.run.column(ChannelKind::Pv(0))?, view.run.column(ChannelKind::Mv(0))?);
             let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s) + 1;
-            let whole = range.filter(|&i| i < pv.len() && pv.values()[i].is_finite() && mv.values()[i].is_finite());
+            let whole =
+                range.filter(|&i| i < pv.len() && pv.values()[i].is_finite() && mv.values()[i].is_finite());
             Some(whole.map(|i| (pv.time_s()[i], pv.values()[i])).unzip())
         }
         ModelOrigin::Log { name, stretch } => {
             let log = view.document.log.as_ref().filter(|l| l.name == *name)?;
             let (pv, mv) = (view.document.roles.pv?, view.document.roles.mv?);
-            let rows = log.complete(&[&log.columns[pv].values, &log.columns[mv].values], stretch.from_s, stretch.to_s);
+            let rows = log.complete(
+                &[&log.columns[pv].values, &log.columns[mv].values],
+                stretch.from_s,
+                stretch.to_s,
+            );
             Some((rows.time_s, rows.columns.first()?.clone()))
         }
     }

@@ -46,7 +46,9 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
                 let time = entry.time_s.map_or_else(|| "–".to_owned(), text::clock);
                 ui.add_sized([48.0, 16.0], egui::Label::new(egui::RichText::new(time).color(p.weak).small()));
                 ui.label(egui::RichText::new(sign).family(theme::bold()).color(colour));
-                ui.add(egui::Label::new(egui::RichText::new(&entry.words).color(colour)).wrap().selectable(true));
+                ui.add(
+                    egui::Label::new(egui::RichText::new(&entry.words).color(colour)).wrap().selectable(true),
+                );
             });
         }
         if !any {

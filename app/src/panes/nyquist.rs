@@ -42,7 +42,9 @@ impl State {
 /// Draws the pane.
 pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let (Some(model), Some(row)) = (&view.tuning.model, row_in_view(view)) else {
-        ui.add(egui::Label::new(RichText::new(tr!("nyquist.no_model")).color(theme::palette(ui).weak)).wrap());
+        ui.add(
+            egui::Label::new(RichText::new(tr!("nyquist.no_model")).color(theme::palette(ui).weak)).wrap(),
+        );
         return vec![];
     };
     let p = theme::palette(ui);
@@ -67,12 +69,17 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         .grid_color(p.grid)
         .label_formatter(move |position| {
             let at = match position {
-                egui_plot::HoverPosition::NearDataPoint { position, .. } | egui_plot::HoverPosition::Elsewhere { position } => *position,
+                egui_plot::HoverPosition::NearDataPoint { position, .. }
+                | egui_plot::HoverPosition::Elsewhere { position } => *position,
             };
             let near = |q: &[f64; 3]| (q[0] - at.x).hypot(q[1] - at.y);
             let nearest = hover.iter().min_by(|a, b| near(a).total_cmp(&near(b)))?;
             (near(nearest) < 0.15).then(|| {
-                format!("ω = {} rad/s\n|L| = {}", text::brief(nearest[2]), text::brief(nearest[0].hypot(nearest[1])))
+                format!(
+                    "ω = {} rad/s\n|L| = {}",
+                    text::brief(nearest[2]),
+                    text::brief(nearest[0].hypot(nearest[1]))
+                )
             })
         })
         .show(ui, |plot| {
@@ -126,7 +133,8 @@ fn circles(plot: &mut egui_plot::PlotUi<'_>, row: &Row, p: &theme::Palette) {
             .collect::<Vec<_>>()
             .into()
     };
-    let unit = Line::new("|L| = 1", circle(0.0, 1.0)).color(p.grid).width(1.0).style(LineStyle::dotted_dense());
+    let unit =
+        Line::new("|L| = 1", circle(0.0, 1.0)).color(p.grid).width(1.0).style(LineStyle::dotted_dense());
     plot.line(unit);
     if let Some(ms) = row.analysis.ms {
         let fill = Polygon::new(format!("Ms = {}", text::brief(ms)), circle(-1.0, 1.0 / ms));

@@ -29,9 +29,16 @@ struct Cached {
 }
 
 impl State {
-    fn response(&mut self, model: &ProcessModel, gains: &PidGains, horizon_s: Option<f64>) -> std::rc::Rc<Response> {
+    fn response(
+        &mut self,
+        model: &ProcessModel,
+        gains: &PidGains,
+        horizon_s: Option<f64>,
+    ) -> std::rc::Rc<Response> {
         let load = self.load;
-        let same = |c: &&Cached| c.model == *model && c.gains == *gains && c.load == load && c.horizon_s == horizon_s;
+        let same = |c: &&Cached| {
+            c.model == *model && c.gains == *gains && c.load == load && c.horizon_s == horizon_s
+        };
         if let Some(known) = self.cached.iter().find(same) {
             return known.response.clone();
         }
@@ -41,7 +48,13 @@ impl State {
         if self.cached.len() >= 12 {
             self.cached.remove(0);
         }
-        self.cached.push(Cached { model: model.clone(), gains: *gains, load, horizon_s, response: response.clone() });
+        self.cached.push(Cached {
+            model: model.clone(),
+            gains: *gains,
+            load,
+            horizon_s,
+            response: response.clone(),
+        });
         response
     }
 }
@@ -66,7 +79,10 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
     let ghost = present.map(|r| state.response(model, &r.gains, shown_s));
     let height = ui.available_height() - 36.0;
-    let units = view.document.model().map_or((String::new(), String::new()), |e| (e.pv_unit.clone(), e.mv_unit.clone()));
+    let units = view
+        .document
+        .model()
+        .map_or((String::new(), String::new()), |e| (e.pv_unit.clone(), e.mv_unit.clone()));
     curves(ui, true, 0.58 * height, &response, ghost.as_deref(), &units, state.load);
     curves(ui, false, 0.42 * height, &response, ghost.as_deref(), &units, state.load);
     figures(ui, row, &first, state.load, &units);
@@ -117,7 +133,8 @@ fn figures(ui: &mut egui::Ui, row: &Row, response: &Response, load: bool, units:
         Ok(m) if row.analysis.stable => {
             let iae = if load { row.figures.iae_load } else { row.figures.iae_setpoint };
             let unit = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
-            let iae_unit = if load { format!("{}·s/{}", unit(&units.0), unit(&units.1)) } else { "s".to_owned() };
+            let iae_unit =
+                if load { format!("{}·s/{}", unit(&units.0), unit(&units.1)) } else { "s".to_owned() };
             let first = tr!(
                 "step.figures",
                 iae = text::maybe(iae),

@@ -92,13 +92,17 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
             }
         } else {
             ui.checkbox(&mut state.follow, tr!("trend.follow"));
-            let label = |span: Option<f64>| span.map_or_else(|| tr!("trend.all"), |s| format!("{} min", s / 60.0));
+            let label =
+                |span: Option<f64>| span.map_or_else(|| tr!("trend.all"), |s| format!("{} min", s / 60.0));
             let before = state.span;
-            egui::ComboBox::from_id_salt("span").width(70.0).selected_text(label(SPANS_S[state.span])).show_ui(ui, |ui| {
-                for (i, span) in SPANS_S.into_iter().enumerate() {
-                    ui.selectable_value(&mut state.span, i, label(span));
-                }
-            });
+            egui::ComboBox::from_id_salt("span")
+                .width(70.0)
+                .selected_text(label(SPANS_S[state.span]))
+                .show_ui(ui, |ui| {
+                    for (i, span) in SPANS_S.into_iter().enumerate() {
+                        ui.selectable_value(&mut state.span, i, label(span));
+                    }
+                });
             state.follow |= before != state.span;
             ui.checkbox(&mut state.tanks, tr!("trend.tanks")).on_hover_text(tr!("trend.tanks_hint"));
         }
@@ -129,7 +133,13 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
         for (i, tank) in spec.tanks.iter().enumerate() {
             if let Some(data) = view.run.column(ChannelKind::Level(i)) {
                 let colour = theme::series(p, i + 3);
-                upper.push(Curve { name: format!("{} [cm]", tank.id), data, colour, steps: false, thin: true });
+                upper.push(Curve {
+                    name: format!("{} [cm]", tank.id),
+                    data,
+                    colour,
+                    steps: false,
+                    thin: true,
+                });
             }
         }
     }
@@ -137,7 +147,13 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
         let unit = spec.pumps[now.pump].unit.symbol();
         units.push(unit);
         let shade = |c: Color32| if slot == 0 { c } else { c.gamma_multiply(0.55 + 0.1 * slot as f32) };
-        let push = |to: &mut Vec<Curve<'a>>, run: &'a crate::traces::RunTrace, kind, name: String, colour, steps, thin| {
+        let push = |to: &mut Vec<Curve<'a>>,
+                    run: &'a crate::traces::RunTrace,
+                    kind,
+                    name: String,
+                    colour,
+                    steps,
+                    thin| {
             if let Some(data) = run.column(kind) {
                 to.push(Curve { name, data, colour, steps, thin });
             }
@@ -145,12 +161,44 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
         if let Some(kept) = view.kept {
             let name = |what: &str| format!("{what}, {}", tr!("trend.kept"));
             push(&mut upper, kept, ChannelKind::Pv(slot), name("PV [cm]"), p.ghost, false, true);
-            push(&mut lower, kept, ChannelKind::Mv(slot), format!("{} ", name(&format!("MV [{unit}]"))), p.ghost, true, true);
+            push(
+                &mut lower,
+                kept,
+                ChannelKind::Mv(slot),
+                format!("{} ", name(&format!("MV [{unit}]"))),
+                p.ghost,
+                true,
+                true,
+            );
         }
         let sensor = &spec.sensors[now.sensor].id;
-        push(&mut upper, view.run, ChannelKind::Setpoint(slot), format!("SP {} [cm]", now.tag), shade(p.sp), true, false);
-        push(&mut upper, view.run, ChannelKind::Pv(slot), format!("PV {sensor} [cm]"), shade(p.pv), false, false);
-        push(&mut lower, view.run, ChannelKind::Mv(slot), format!("MV {} [{unit}]", spec.pumps[now.pump].id), shade(p.mv), true, false);
+        push(
+            &mut upper,
+            view.run,
+            ChannelKind::Setpoint(slot),
+            format!("SP {} [cm]", now.tag),
+            shade(p.sp),
+            true,
+            false,
+        );
+        push(
+            &mut upper,
+            view.run,
+            ChannelKind::Pv(slot),
+            format!("PV {sensor} [cm]"),
+            shade(p.pv),
+            false,
+            false,
+        );
+        push(
+            &mut lower,
+            view.run,
+            ChannelKind::Mv(slot),
+            format!("MV {} [{unit}]", spec.pumps[now.pump].id),
+            shade(p.mv),
+            true,
+            false,
+        );
     }
     Content {
         upper,
@@ -181,9 +229,16 @@ fn of_log<'a>(view: &View<'a>, p: &Palette) -> Content<'a> {
             }
         }
         if let (Some(data), Some(i)) = (mv, roles.mv) {
-            lower.push(Curve { name: format!("MV {}", name(i)), data, colour: p.mv, steps: true, thin: false });
+            lower.push(Curve {
+                name: format!("MV {}", name(i)),
+                data,
+                colour: p.mv,
+                steps: true,
+                thin: false,
+            });
         }
-        axes = [roles.pv.map_or_else(|| "PV".to_owned(), name), roles.mv.map_or_else(|| "MV".to_owned(), name)];
+        axes =
+            [roles.pv.map_or_else(|| "PV".to_owned(), name), roles.mv.map_or_else(|| "MV".to_owned(), name)];
     }
     let [upper_axis, lower_axis] = axes;
     Content { upper, lower, upper_axis, lower_axis, end_s }
@@ -222,7 +277,9 @@ fn plot(
         .label_formatter(move |position| {
             let at = |point: &PlotPoint| format!("{}\n{}", text::clock(point.x), text::fixed(point.y, 3));
             match position {
-                egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } if names.iter().any(|n| n == plot_name) => {
+                egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. }
+                    if names.iter().any(|n| n == plot_name) =>
+                {
                     Some(format!("{plot_name}\n{}", at(position)))
                 }
                 egui_plot::HoverPosition::NearDataPoint { position, .. } => Some(at(position)),
@@ -272,7 +329,12 @@ fn plot(
 }
 
 /// Draws the curves and gives the range of what is in view.
-fn draw_curves(plot_ui: &mut PlotUi, curves: &[Curve], bounds: [f64; 2], pixels: usize) -> Option<(f64, f64)> {
+fn draw_curves(
+    plot_ui: &mut PlotUi,
+    curves: &[Curve],
+    bounds: [f64; 2],
+    pixels: usize,
+) -> Option<(f64, f64)> {
     let mut range: Option<(f64, f64)> = None;
     let mut points = Vec::new();
     for curve in curves {
@@ -305,7 +367,13 @@ fn steps(points: &[[f64; 2]], end_s: f64) -> Vec<[f64; 2]> {
     line
 }
 
-fn draw_marks(plot_ui: &mut PlotUi, marks: &[crate::traces::Mark], bounds: [f64; 2], words: bool, p: &Palette) {
+fn draw_marks(
+    plot_ui: &mut PlotUi,
+    marks: &[crate::traces::Mark],
+    bounds: [f64; 2],
+    words: bool,
+    p: &Palette,
+) {
     let span = bounds[1] - bounds[0];
     let visible = marks.iter().filter(|m| (bounds[0]..=bounds[1]).contains(&m.time_s));
     let top = plot_ui.plot_bounds().max()[1];
@@ -342,5 +410,11 @@ fn brush(r: &egui::Response, pointer: Option<PlotPoint>, state: &mut State, acti
 }
 
 fn axis_time(mark: GridMark) -> String {
-    if mark.step_size < 1.0 { format!("{} s", text::fixed(mark.value, 1)) } else if mark.value < 0.0 { String::new() } else { text::clock(mark.value) }
+    if mark.step_size < 1.0 {
+        format!("{} s", text::fixed(mark.value, 1))
+    } else if mark.value < 0.0 {
+        String::new()
+    } else {
+        text::clock(mark.value)
+    }
 }

@@ -49,7 +49,9 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             state.kind = kind;
         }
         let forms = [tr!("tune.ideal"), tr!("tune.parallel")];
-        if let Some(form) = segmented(ui, &tr!("tune.form"), &forms, usize::from(state.form == Form::Parallel)) {
+        if let Some(form) =
+            segmented(ui, &tr!("tune.form"), &forms, usize::from(state.form == Form::Parallel))
+        {
             state.form = if form == 1 { Form::Parallel } else { Form::Ideal };
         }
     });
@@ -80,10 +82,13 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let rows: Vec<&Row> = view.tuning.rows.iter().filter(|r| shown(state, r)).collect();
     let entry = view.document.model();
     let unit = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
-    let (pv, mv) = entry.map_or(("–".to_owned(), "–".to_owned()), |e| (unit(&e.pv_unit), unit(&e.mv_unit)));
+    let (pv, mv) =
+        entry.map_or(("–".to_owned(), "–".to_owned()), |e| (unit(&e.pv_unit), unit(&e.mv_unit)));
     let gains = match state.form {
         Form::Ideal => [format!("Kc\n{mv}/{pv}"), "Ti\ns".to_owned(), "Td\ns".to_owned()],
-        Form::Parallel => [format!("Kp\n{mv}/{pv}"), format!("Ki\n{mv}/({pv}·s)"), format!("Kd\n{mv}·s/{pv}")],
+        Form::Parallel => {
+            [format!("Kp\n{mv}/{pv}"), format!("Ki\n{mv}/({pv}·s)"), format!("Kd\n{mv}·s/{pv}")]
+        }
     };
     let rest = [
         ("Ms".to_owned(), tr!("tune.ms_hint")),
@@ -187,7 +192,8 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
         let able = tag.is_some() && row.rule != PRESENT && row.gains.ti_s.is_finite() && matches_loop(view);
         let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| tr!("tune.apply_to", tag = t));
         let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
-        let hint = if row.gains.ti_s.is_finite() { tr!("tune.apply_hint") } else { tr!("tune.needs_integral") };
+        let hint =
+            if row.gains.ti_s.is_finite() { tr!("tune.apply_hint") } else { tr!("tune.needs_integral") };
         if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked() {
             if let Some(tag) = tag {
                 actions.push(apply(view, row, tag));
@@ -199,7 +205,11 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
         if let (Some(tau_c_s), Some(rule)) = (row.tau_c_s, find_rule(row.rule, row.kind)) {
             let name = ui.label("τc");
             let mut value = tau_c_s;
-            let field = egui::DragValue::new(&mut value).range(1e-3..=1e6).speed(tau_c_s / 100.0).max_decimals(3).suffix(" s");
+            let field = egui::DragValue::new(&mut value)
+                .range(1e-3..=1e6)
+                .speed(tau_c_s / 100.0)
+                .max_decimals(3)
+                .suffix(" s");
             let field = ui.add(field).labelled_by(name.id).on_hover_text(tr!("tune.tau_c_hint"));
             if field.changed() {
                 actions.push(Action::Document(DocumentCommand::TauC(rule.id.to_owned(), Some(value))));

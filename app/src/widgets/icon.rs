@@ -1,6 +1,6 @@
 //! Buttons with a drawn sign: crisp at every size, and no font has to have it.
 
-use eframe::egui::{self, Color32, Painter, Rect, Sense, Shape, Stroke, Vec2, WidgetInfo, Role, pos2, vec2};
+use eframe::egui::{self, Color32, Painter, Rect, Role, Sense, Shape, Stroke, Vec2, WidgetInfo, pos2, vec2};
 
 use crate::theme;
 
@@ -36,7 +36,13 @@ pub fn icon_button(ui: &mut egui::Ui, icon: Icon, name: &str, enabled: bool) -> 
     let (rect, response) = ui.allocate_exact_size(size, sense);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));
     let visuals = if enabled { *ui.style().interact(&response) } else { ui.visuals().widgets.inactive };
-    ui.painter().rect(rect, visuals.corner_radius, visuals.weak_bg_fill, visuals.bg_stroke, egui::StrokeKind::Inside);
+    ui.painter().rect(
+        rect,
+        visuals.corner_radius,
+        visuals.weak_bg_fill,
+        visuals.bg_stroke,
+        egui::StrokeKind::Inside,
+    );
     let p = theme::palette(ui);
     let ink = if !enabled {
         p.body
@@ -59,7 +65,11 @@ fn paint(painter: &Painter, icon: Icon, r: Rect, ink: Color32) {
         }
         Icon::Pause => {
             for x in [r.left(), r.right() - r.width() * 0.36] {
-                painter.rect_filled(Rect::from_min_size(pos2(x, r.top()), vec2(r.width() * 0.36, r.height())), 0.0, ink);
+                painter.rect_filled(
+                    Rect::from_min_size(pos2(x, r.top()), vec2(r.width() * 0.36, r.height())),
+                    0.0,
+                    ink,
+                );
             }
         }
         Icon::Step => {

@@ -1,6 +1,6 @@
 //! A row of exclusive choices.
 
-use eframe::egui::{self, CornerRadius, WidgetInfo, Role};
+use eframe::egui::{self, CornerRadius, Role, WidgetInfo};
 
 use crate::theme;
 
@@ -25,7 +25,9 @@ pub fn segmented(ui: &mut egui::Ui, group: &str, labels: &[String], chosen: usiz
                 .corner_radius(round(i == 0, i == last))
                 .min_size(egui::vec2(0.0, theme::PRESS));
             let response = ui.add(button);
-            response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, on, format!("{group}: {label}")));
+            response.widget_info(|| {
+                WidgetInfo::selected(Role::RadioButton, true, on, format!("{group}: {label}"))
+            });
             if response.clicked() && !on {
                 pressed = Some(i);
             }

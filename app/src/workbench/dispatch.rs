@@ -183,7 +183,9 @@ impl Workbench {
         let columns: Vec<&[f64]> = self.run.columns.iter().map(|c| c.values()).collect();
         let time_s = self.run.columns.first().map_or(&[][..], |c| c.time_s());
         match vasos_io::rig::write_columns_csv(&channels, time_s, &columns, &path) {
-            Ok(()) => self.tell(Weight::Note, tr!("event.exported", rows = time_s.len(), path = path.display())),
+            Ok(()) => {
+                self.tell(Weight::Note, tr!("event.exported", rows = time_s.len(), path = path.display()))
+            }
             Err(error) => self.refuse(i18n::say(&error)),
         }
     }

@@ -49,7 +49,9 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
     }
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) => return Outcome::Failed(Box::new(FileError::Read { path: shown, reason: error.to_string() })),
+        Err(error) => {
+            return Outcome::Failed(Box::new(FileError::Read { path: shown, reason: error.to_string() }));
+        }
     };
     let name = path.file_name().map_or(shown, |n| n.to_string_lossy().into_owned());
     match import_log(&name, &bytes, options) {
@@ -99,12 +101,16 @@ impl Workbench {
         let Some(path) = &mut self.path_field else { return };
         let mut open = true;
         let mut chosen = false;
-        egui::Window::new(tr!("window.path_title")).open(&mut open).collapsible(false).resizable(false).show(ui.ctx(), |ui| {
-            ui.label(tr!("window.path_hint"));
-            let field = ui.add(egui::TextEdit::singleline(path).desired_width(420.0));
-            field.request_focus();
-            chosen = ui.input(|i| i.key_pressed(egui::Key::Enter)) || ui.button(tr!("window.open")).clicked();
-        });
+        egui::Window::new(tr!("window.path_title")).open(&mut open).collapsible(false).resizable(false).show(
+            ui.ctx(),
+            |ui| {
+                ui.label(tr!("window.path_hint"));
+                let field = ui.add(egui::TextEdit::singleline(path).desired_width(420.0));
+                field.request_focus();
+                chosen =
+                    ui.input(|i| i.key_pressed(egui::Key::Enter)) || ui.button(tr!("window.open")).clicked();
+            },
+        );
         if chosen && !path.trim().is_empty() {
             actions.push(Action::OpenFile(PathBuf::from(path.trim())));
             open = false;
@@ -127,9 +133,12 @@ impl Workbench {
                 let table = std::sync::Arc::new(sheet.log.table);
                 actions.push(Action::Document(DocumentCommand::OpenLog(table, sheet.roles)));
             }
-            Answer::Cancel => self.tell(Weight::Note, tr!("import_sheet.cancelled", name = sheet.log.table.name)),
+            Answer::Cancel => {
+                self.tell(Weight::Note, tr!("import_sheet.cancelled", name = sheet.log.table.name))
+            }
             Answer::ReadAgain => {
-                let options = ImportOptions { sample_time_s: Some(sheet.sample_time_s), ..ImportOptions::default() };
+                let options =
+                    ImportOptions { sample_time_s: Some(sheet.sample_time_s), ..ImportOptions::default() };
                 let path = sheet.path.clone();
                 self.jobs.start("import", move || read(&path, &options));
             }
@@ -162,7 +171,8 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
         if sheet.log.report.time_column.is_none() {
             ui.horizontal(|ui| {
                 let name = ui.label(tr!("import_sheet.sample_time"));
-                let field = egui::DragValue::new(&mut sheet.sample_time_s).range(1e-6..=1e6).speed(0.01).suffix(" s");
+                let field =
+                    egui::DragValue::new(&mut sheet.sample_time_s).range(1e-6..=1e6).speed(0.01).suffix(" s");
                 ui.add(field).labelled_by(name.id);
                 if ui.button(tr!("import_sheet.again")).clicked() {
                     answer = Answer::ReadAgain;
@@ -172,7 +182,12 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
         let p = theme::palette(ui);
         egui::ScrollArea::vertical().id_salt("repairs").max_height(110.0).show(ui, |ui| {
             for repair in &sheet.log.report.repairs {
-                ui.add(egui::Label::new(egui::RichText::new(format!("! {}", i18n::say(repair))).color(p.caution)).wrap());
+                ui.add(
+                    egui::Label::new(
+                        egui::RichText::new(format!("! {}", i18n::say(repair))).color(p.caution),
+                    )
+                    .wrap(),
+                );
             }
         });
         let same = sheet.roles.pv.is_some() && sheet.roles.pv == sheet.roles.mv;
@@ -182,8 +197,10 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
         }
         ui.add_space(theme::GAP);
         ui.horizontal(|ui| {
-            let take = egui::Button::new(egui::RichText::new(tr!("import_sheet.use")).color(p.on_accent)).fill(p.accent);
-            if ui.add_enabled(!same, take).clicked() {
+            let take = egui::Button::new(egui::RichText::new(tr!("import_sheet.use")).color(p.on_accent))
+                .fill(p.accent);
+            let enter = !same && ui.input(|i| i.key_pressed(egui::Key::Enter));
+            if ui.add_enabled(!same, take).clicked() || enter {
                 answer = Answer::Use;
             }
             if ui.button(tr!("import_sheet.cancel")).clicked() {
@@ -214,7 +231,10 @@ fn preview(ui: &mut egui::Ui, sheet: &ImportSheet) {
         for (i, column) in table.columns.iter().enumerate() {
             let unit = column.unit.as_ref().map_or(String::new(), |u| format!(" [{u}]"));
             let role = [("PV", sheet.roles.pv), ("SP", sheet.roles.sp), ("MV", sheet.roles.mv)];
-            let role = role.iter().find(|(_, r)| *r == Some(i)).map_or(String::new(), |(name, _)| format!("  · {name}"));
+            let role = role
+                .iter()
+                .find(|(_, r)| *r == Some(i))
+                .map_or(String::new(), |(name, _)| format!("  · {name}"));
             ui.strong(format!("{}{unit}{role}", column.name));
         }
         ui.end_row();
@@ -222,7 +242,8 @@ fn preview(ui: &mut egui::Ui, sheet: &ImportSheet) {
             ui.label(text::brief(table.time_s[row]));
             for column in &table.columns {
                 let value = column.values[row];
-                let state = column.states.get(value as usize).filter(|_| !column.states.is_empty() && value >= 0.0);
+                let state =
+                    column.states.get(value as usize).filter(|_| !column.states.is_empty() && value >= 0.0);
                 ui.label(state.cloned().unwrap_or_else(|| text::brief(value)));
             }
             ui.end_row();

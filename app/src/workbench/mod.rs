@@ -25,8 +25,8 @@ pub use settings::Settings;
 
 use self::files::ImportSheet;
 pub use self::files::column_choice;
-pub use self::jobs::Outcome;
 use self::jobs::Jobs;
+pub use self::jobs::Outcome;
 
 /// How a workbench starts.
 #[derive(Debug, Clone, Default)]
@@ -229,7 +229,9 @@ impl Workbench {
             keys.into_iter().filter(|(key, _)| i.consume_shortcut(key)).map(|(_, action)| action).collect()
         });
         // A focused button takes the space bar itself.
-        if ui.memory(|m| m.focused()).is_none() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Space)) {
+        if ui.memory(|m| m.focused()).is_none()
+            && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Space))
+        {
             actions.push(Action::ToggleRunning);
         }
         actions
@@ -306,6 +308,7 @@ pub fn open(options: Options) -> anyhow::Result<()> {
         persist_window: true,
         ..eframe::NativeOptions::default()
     };
-    let create: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(Workbench::new(&cc.egui_ctx, options)?)));
+    let create: eframe::AppCreator<'_> =
+        Box::new(move |cc| Ok(Box::new(Workbench::new(&cc.egui_ctx, options)?)));
     eframe::run_native("vasos", native, create).map_err(|e| anyhow::anyhow!("{e}"))
 }

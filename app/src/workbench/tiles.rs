@@ -1,7 +1,10 @@
 //! The arrangement of panes.
 
 use eframe::egui::{self, WidgetText};
-use egui_tiles::{Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree, UiResponse};
+use egui_tiles::{
+    Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree,
+    UiResponse,
+};
 
 use crate::action::Action;
 use crate::panes::{self, PaneKind, States, View};
@@ -14,7 +17,8 @@ pub fn first_layout() -> Tree<PaneKind> {
         let children = panes.iter().map(|p| tiles.insert_pane(*p)).collect();
         tiles.insert_tab_tile(children)
     };
-    let above: Vec<TileId> = [PaneKind::Pid, PaneKind::Faceplate, PaneKind::Trend].map(|p| tab(&mut tiles, &[p])).into();
+    let above: Vec<TileId> =
+        [PaneKind::Pid, PaneKind::Faceplate, PaneKind::Trend].map(|p| tab(&mut tiles, &[p])).into();
     let below: Vec<TileId> = vec![
         tab(&mut tiles, &[PaneKind::Identify]),
         tab(&mut tiles, &[PaneKind::Tune]),
@@ -39,7 +43,8 @@ pub fn first_layout() -> Tree<PaneKind> {
 
 /// Whether an arrangement still has every pane once.
 pub fn is_whole(tree: &Tree<PaneKind>) -> bool {
-    let panes: Vec<PaneKind> = tree.tiles.tiles().filter_map(|t| if let Tile::Pane(p) = t { Some(*p) } else { None }).collect();
+    let panes: Vec<PaneKind> =
+        tree.tiles.tiles().filter_map(|t| if let Tile::Pane(p) = t { Some(*p) } else { None }).collect();
     panes.len() == PaneKind::ALL.len() && PaneKind::ALL.iter().all(|p| panes.contains(p))
 }
 
@@ -94,7 +99,12 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
         egui::RichText::new(tr!(pane.key())).family(theme::bold()).into()
     }
 
-    fn on_tab_button(&mut self, tiles: &mut Tiles<PaneKind>, tile_id: TileId, button: egui::Response) -> egui::Response {
+    fn on_tab_button(
+        &mut self,
+        tiles: &mut Tiles<PaneKind>,
+        tile_id: TileId,
+        button: egui::Response,
+    ) -> egui::Response {
         if button.double_clicked() {
             if let Some(kind) = tiles.get_pane(&tile_id) {
                 self.actions.push(Action::Maximise(*kind));
@@ -117,7 +127,9 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
 
     fn resize_stroke(&self, style: &egui::Style, state: egui_tiles::ResizeState) -> egui::Stroke {
         match state {
-            egui_tiles::ResizeState::Idle => egui::Stroke::new(self.gap_width(style), style.visuals.panel_fill),
+            egui_tiles::ResizeState::Idle => {
+                egui::Stroke::new(self.gap_width(style), style.visuals.panel_fill)
+            }
             egui_tiles::ResizeState::Hovering | egui_tiles::ResizeState::Dragging => {
                 egui::Stroke::new(2.0, style.visuals.hyperlink_color)
             }
@@ -132,15 +144,33 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
         visuals.window_fill
     }
 
-    fn tab_bg_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Color32 {
+    fn tab_bg_color(
+        &self,
+        visuals: &egui::Visuals,
+        _: &Tiles<PaneKind>,
+        _: TileId,
+        _: &TabState,
+    ) -> egui::Color32 {
         visuals.window_fill
     }
 
-    fn tab_text_color(&self, visuals: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, state: &TabState) -> egui::Color32 {
+    fn tab_text_color(
+        &self,
+        visuals: &egui::Visuals,
+        _: &Tiles<PaneKind>,
+        _: TileId,
+        state: &TabState,
+    ) -> egui::Color32 {
         if state.active { visuals.text_color() } else { visuals.weak_text_color() }
     }
 
-    fn tab_outline_stroke(&self, _: &egui::Visuals, _: &Tiles<PaneKind>, _: TileId, _: &TabState) -> egui::Stroke {
+    fn tab_outline_stroke(
+        &self,
+        _: &egui::Visuals,
+        _: &Tiles<PaneKind>,
+        _: TileId,
+        _: &TabState,
+    ) -> egui::Stroke {
         egui::Stroke::NONE
     }
 

@@ -39,7 +39,9 @@ impl Workbench {
                 if spec.configurations.len() > 1 {
                     let titles: Vec<String> =
                         spec.configurations.iter().map(|c| c.title.get(language).to_owned()).collect();
-                    if let Some(i) = segmented(ui, &tr!("top.configuration"), &titles, document.rig.configuration) {
+                    if let Some(i) =
+                        segmented(ui, &tr!("top.configuration"), &titles, document.rig.configuration)
+                    {
                         actions.push(Action::Document(DocumentCommand::Configuration(i)));
                     }
                 }
@@ -64,14 +66,17 @@ impl Workbench {
                         ui.weak(tr!("menu.no_recent"));
                     }
                     for path in &self.settings.recent {
-                        let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
+                        let name = path
+                            .file_name()
+                            .map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
                         if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
                             actions.push(Action::OpenFile(path.clone()));
                         }
                     }
                 });
                 ui.separator();
-                let record = if self.recording.is_some() { tr!("top.stop_recording") } else { tr!("top.record") };
+                let record =
+                    if self.recording.is_some() { tr!("top.stop_recording") } else { tr!("top.record") };
                 if ui.add(egui::Button::new(record).shortcut_text("Ctrl+R")).clicked() {
                     actions.push(Action::ToggleRecording);
                 }
@@ -86,7 +91,9 @@ impl Workbench {
             ui.menu_button(tr!("menu.edit"), |ui| {
                 let undo = self.history.undo_key();
                 let redo = self.history.redo_key();
-                let name = |verb: &str, key: Option<&str>| key.map_or_else(|| tr!(verb), |k| format!("{}: {}", tr!(verb), journal::change(k)));
+                let name = |verb: &str, key: Option<&str>| {
+                    key.map_or_else(|| tr!(verb), |k| format!("{}: {}", tr!(verb), journal::change(k)))
+                };
                 let button = egui::Button::new(name("menu.undo", undo)).shortcut_text("Ctrl+Z");
                 if ui.add_enabled(undo.is_some(), button).clicked() {
                     actions.push(Action::Undo);
@@ -129,7 +136,8 @@ impl Workbench {
 
     fn transport(&self, ui: &mut egui::Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let (icon, name) = if snapshot.running { (Icon::Pause, tr!("top.pause")) } else { (Icon::Run, tr!("top.run")) };
+        let (icon, name) =
+            if snapshot.running { (Icon::Pause, tr!("top.pause")) } else { (Icon::Run, tr!("top.run")) };
         if icon_button(ui, icon, &name, true).clicked() {
             actions.push(Action::ToggleRunning);
         }
@@ -179,10 +187,16 @@ impl Workbench {
                 if icon_button(ui, Icon::Stop, &tr!("top.stop_recording"), true).clicked() {
                     actions.push(Action::ToggleRecording);
                 }
-                let file = recording.path().file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+                let file =
+                    recording.path().file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
                 let size = text::brief(recording.bytes() as f64 / 1e6);
                 let words = format!("REC {} · {size} MB", recording.rows());
-                let hover = tr!("top.recording_hint", file = file, viewer = recording.address().unwrap_or("–"), lost = recording.lost());
+                let hover = tr!(
+                    "top.recording_hint",
+                    file = file,
+                    viewer = recording.address().unwrap_or("–"),
+                    lost = recording.lost()
+                );
                 ui.label(RichText::new(words).color(p.text)).on_hover_text(hover);
                 let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(10.0), egui::Sense::hover());
                 ui.painter().circle_filled(rect.center(), 5.0, p.alarm);
@@ -195,20 +209,30 @@ impl Workbench {
         }
     }
 
-    pub(super) fn status_bar(&self, ui: &mut egui::Ui, snapshot: &Snapshot, document: &Document) -> Vec<Action> {
+    pub(super) fn status_bar(
+        &self,
+        ui: &mut egui::Ui,
+        snapshot: &Snapshot,
+        document: &Document,
+    ) -> Vec<Action> {
         let p = theme::palette(ui);
         let frame = egui::Frame::NONE.fill(p.pane).inner_margin(egui::Margin::symmetric(10, 3));
         egui::Panel::bottom("status").frame(frame).show(ui, |ui| {
             ui.horizontal(|ui| {
                 let small = |words: String| RichText::new(words).size(theme::SMALL).color(p.weak);
                 let state = if snapshot.running {
-                    let reached = if snapshot.achieved_speed.is_finite() { snapshot.achieved_speed } else { snapshot.speed };
+                    let reached = if snapshot.achieved_speed.is_finite() {
+                        snapshot.achieved_speed
+                    } else {
+                        snapshot.speed
+                    };
                     tr!("status.running", speed = text::brief(reached))
                 } else {
                     tr!("status.paused")
                 };
                 let sample_ms = document.rig.network.spec.sample_time_s * 1000.0;
-                let balance = if snapshot.balance_error_cm3.abs() < 5e-5 { 0.0 } else { snapshot.balance_error_cm3 };
+                let balance =
+                    if snapshot.balance_error_cm3.abs() < 5e-5 { 0.0 } else { snapshot.balance_error_cm3 };
                 let parts = [
                     state,
                     format!("t {}", text::clock(snapshot.time_s)),
@@ -220,16 +244,23 @@ impl Workbench {
                     let more = snapshot.alarms.len() - 1;
                     let words = tr!(&format!("alarm.{}", alarm.key()), tag = alarm.tag());
                     let words = if more > 0 { format!("{words} +{more}") } else { words };
-                    egui::Frame::NONE.fill(p.alarm).corner_radius(3).inner_margin(egui::Margin::symmetric(6, 1)).show(ui, |ui| {
-                        ui.label(RichText::new(format!("! {words}")).size(theme::SMALL).color(p.on_alarm));
-                    });
+                    egui::Frame::NONE
+                        .fill(p.alarm)
+                        .corner_radius(3)
+                        .inner_margin(egui::Margin::symmetric(6, 1))
+                        .show(ui, |ui| {
+                            ui.label(
+                                RichText::new(format!("! {words}")).size(theme::SMALL).color(p.on_alarm),
+                            );
+                        });
                 } else {
                     ui.label(small(tr!("faceplate.no_alarm")));
                 }
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     let language = i18n::current().tag();
                     let spec = &document.rig.network.spec;
-                    let note = spec.note.as_ref().map_or(String::new(), |n| format!(" · {}", n.get(language)));
+                    let note =
+                        spec.note.as_ref().map_or(String::new(), |n| format!(" · {}", n.get(language)));
                     ui.label(small(format!("{}{note}", spec.title.get(language))));
                 });
             });
@@ -249,7 +280,9 @@ impl Workbench {
                 egui::Frame::NONE.fill(p.alarm).corner_radius(5).inner_margin(10).show(ui, |ui| {
                     ui.set_max_width(620.0);
                     ui.horizontal(|ui| {
-                        ui.add(egui::Label::new(RichText::new(format!("! {words}")).color(p.on_alarm)).wrap());
+                        ui.add(
+                            egui::Label::new(RichText::new(format!("! {words}")).color(p.on_alarm)).wrap(),
+                        );
                         away = ui.button(tr!("window.understood")).clicked();
                     });
                 });
@@ -264,7 +297,8 @@ fn rig_menu(ui: &mut egui::Ui, document: &Document, actions: &mut Vec<Action>) {
     let language = i18n::current().tag();
     for preset in PRESETS {
         // Presets are parsed when the menu is open, which is seldom.
-        let title = vasos_io::rig::preset(preset.id).map_or(preset.id.to_owned(), |n| n.spec.title.get(language).to_owned());
+        let title = vasos_io::rig::preset(preset.id)
+            .map_or(preset.id.to_owned(), |n| n.spec.title.get(language).to_owned());
         if ui.selectable_label(document.rig.network.spec.id == preset.id, title).clicked() {
             actions.push(Action::OpenPreset(preset.id));
         }

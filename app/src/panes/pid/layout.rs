@@ -84,8 +84,11 @@ impl Layout {
             suctions.push(suction);
             discharges.push(discharge);
         }
-        let sensors: Vec<Pos2> =
-            network.sensors.iter().map(|s| pos2(tanks[s.tank].right() + 0.36, tanks[s.tank].center().y)).collect();
+        let sensors: Vec<Pos2> = network
+            .sensors
+            .iter()
+            .map(|s| pos2(tanks[s.tank].right() + 0.36, tanks[s.tank].center().y))
+            .collect();
         let controllers = network
             .pumps
             .iter()
@@ -107,7 +110,18 @@ impl Layout {
             }
         }
         bounds.extend_with(bounds.max + vec2(0.0, 0.1));
-        Self { bounds, tanks, spill_side, valves, valve_routes, pumps, suctions, discharges, sensors, controllers }
+        Self {
+            bounds,
+            tanks,
+            spill_side,
+            valves,
+            valve_routes,
+            pumps,
+            suctions,
+            discharges,
+            sensors,
+            controllers,
+        }
     }
 }
 
@@ -128,7 +142,10 @@ fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Rou
             (pos2(from.left(), y), pos2(target.right(), y))
         };
         let at = start + (end - start) * 0.5;
-        return (ValvePlace { at, vertical: false }, Route { pipe: vec![start, end], falls_into: None, to_outside: false });
+        return (
+            ValvePlace { at, vertical: false },
+            Route { pipe: vec![start, end], falls_into: None, to_outside: false },
+        );
     }
     let start = from.center_bottom();
     let mut pipe = vec![start];

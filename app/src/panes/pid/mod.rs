@@ -6,7 +6,7 @@ mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{self, Id, Rect, Sense, WidgetInfo, Role, vec2};
+use eframe::egui::{self, Id, Rect, Role, Sense, WidgetInfo, vec2};
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::plant::Network;
 use vasos_engine::session::RigCommand;
@@ -89,7 +89,8 @@ fn valve_ui(
     scale: f32,
     actions: &mut Vec<Action>,
 ) {
-    let response = ui.interact(paint::valve_rect(valve, scale), Id::unique(("valve", index)), Sense::click_and_drag());
+    let response =
+        ui.interact(paint::valve_rect(valve, scale), Id::unique(("valve", index)), Sense::click_and_drag());
     let shown = view.document.rig.angles_deg.get(index).copied().unwrap_or(valve.angle_deg);
     response.widget_info(|| WidgetInfo::slider(true, shown, tr!("pid.valve", tag = valve.tag)));
     let turn = |angle_deg: f64| {
@@ -128,7 +129,8 @@ fn valve_ui(
         ui.set_min_width(150.0);
         ui.strong(tr!("pid.valve", tag = valve.tag));
         let mut angle = shown;
-        let field = egui::DragValue::new(&mut angle).range(0.0..=90.0).speed(0.5).max_decimals(1).suffix(" °");
+        let field =
+            egui::DragValue::new(&mut angle).range(0.0..=90.0).speed(0.5).max_decimals(1).suffix(" °");
         let field = ui.add(field).on_hover_text(tr!("pid.angle"));
         if field.changed() {
             actions.push(Action::Document(DocumentCommand::Angle(valve.tag.clone(), angle)));
@@ -177,7 +179,14 @@ fn tank_popup(ui: &mut egui::Ui, view: &View, index: usize, tank: &TankView, act
     }
 }
 
-fn pump_ui(ui: &mut egui::Ui, view: &View, index: usize, pump: &PumpView, scale: f32, actions: &mut Vec<Action>) {
+fn pump_ui(
+    ui: &mut egui::Ui,
+    view: &View,
+    index: usize,
+    pump: &PumpView,
+    scale: f32,
+    actions: &mut Vec<Action>,
+) {
     let rect = Rect::from_center_size(pump.at, egui::Vec2::splat(2.0 * paint::bubble_radius(scale)));
     let response = ui.interact(rect, Id::unique(("pump", index)), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr!("pid.pump", tag = pump.tag)));

@@ -48,7 +48,13 @@ impl StreamView {
     /// −1, 0 or 1: against the pipe, at rest, along it.
     #[must_use]
     pub fn direction(&self) -> i8 {
-        if self.flow_cm3_s.abs() < STILL_CM3_S { 0 } else if self.flow_cm3_s > 0.0 { 1 } else { -1 }
+        if self.flow_cm3_s.abs() < STILL_CM3_S {
+            0
+        } else if self.flow_cm3_s > 0.0 {
+            1
+        } else {
+            -1
+        }
     }
 }
 
@@ -125,7 +131,8 @@ impl PidModel {
     #[must_use]
     pub fn new(snapshot: &Snapshot, layout: &Layout, rect: Rect) -> Self {
         let frame = Frame::new(layout, rect);
-        let tanks: Vec<TankView> = (0..snapshot.tanks.len()).map(|i| tank(snapshot, layout, &frame, i)).collect();
+        let tanks: Vec<TankView> =
+            (0..snapshot.tanks.len()).map(|i| tank(snapshot, layout, &frame, i)).collect();
         let stream = |route: &Route, flow: f64| StreamView {
             pipe: route.pipe.iter().map(|p| frame.point(*p)).collect(),
             flow_cm3_s: flow,
@@ -164,7 +171,9 @@ impl PidModel {
             .collect();
         let (bubbles, signals) = instruments(snapshot, layout, &frame);
         let taps = layout.sensors.iter().zip(&snapshot.network.sensors);
-        let taps = taps.map(|(at, s)| [pos2(layout.tanks[s.tank].right(), at.y), *at].map(|q| frame.point(q))).collect();
+        let taps = taps
+            .map(|(at, s)| [pos2(layout.tanks[s.tank].right(), at.y), *at].map(|q| frame.point(q)))
+            .collect();
         Self { tanks, valves, pumps, bubbles, taps, signals, scale: frame.scale() }
     }
 }

@@ -79,7 +79,8 @@ fn stream(painter: &Painter, view: &StreamView, width: f32, p: &Palette, phase: 
 /// An arrow on the longest piece of the pipe, in the direction of the flow: dashes alone say nothing on a
 /// printed page.
 fn arrows(painter: &Painter, view: &StreamView, width: f32, p: &Palette) {
-    let longest = view.pipe.windows(2).max_by(|a, b| (a[1] - a[0]).length().total_cmp(&(b[1] - b[0]).length()));
+    let longest =
+        view.pipe.windows(2).max_by(|a, b| (a[1] - a[0]).length().total_cmp(&(b[1] - b[0]).length()));
     let Some([a, b]) = longest.map(|w| [w[0], w[1]]) else { return };
     if (b - a).length() < 30.0 {
         return;
@@ -89,7 +90,11 @@ fn arrows(painter: &Painter, view: &StreamView, width: f32, p: &Palette) {
     // A valve sits in the middle of its pipe; the arrow stands beside it.
     let at = a + (b - a) * 0.82;
     let size = width * 0.95;
-    let points = vec![at + along * size, at - along * size * 0.7 + across * size * 0.8, at - along * size * 0.7 - across * size * 0.8];
+    let points = vec![
+        at + along * size,
+        at - along * size * 0.7 + across * size * 0.8,
+        at - along * size * 0.7 - across * size * 0.8,
+    ];
     painter.add(Shape::convex_polygon(points, p.stream, Stroke::new(1.0, p.pane)));
 }
 
@@ -117,9 +122,16 @@ fn tank(painter: &Painter, view: &TankView, p: &Palette, phase: f32) {
         mark_cm += 5.0;
     }
     // Open at the top.
-    let walls = [view.rect.left_top(), view.rect.left_bottom(), view.rect.right_bottom(), view.rect.right_top()];
+    let walls =
+        [view.rect.left_top(), view.rect.left_bottom(), view.rect.right_bottom(), view.rect.right_top()];
     painter.line(walls.to_vec(), Stroke::new(2.0, p.outline));
-    painter.text(view.rect.left_top() + vec2(9.0, 3.0), Align2::LEFT_TOP, &view.tag, theme::bold_font(13.0), p.text);
+    painter.text(
+        view.rect.left_top() + vec2(9.0, 3.0),
+        Align2::LEFT_TOP,
+        &view.tag,
+        theme::bold_font(13.0),
+        p.text,
+    );
     let reading = format!("{} cm", text::fixed(view.level_cm, 1));
     let at = view.rect.right_top() + vec2(-6.0, 3.0);
     painter.text(at, Align2::RIGHT_TOP, reading, FontId::proportional(13.0), p.text);
@@ -148,11 +160,24 @@ pub fn badge(painter: &Painter, at: Pos2, words: &str, p: &Palette) {
 fn bubble(painter: &Painter, view: &BubbleView, radius: f32, p: &Palette) {
     let edge = if view.abnormal { Stroke::new(2.5, p.alarm) } else { Stroke::new(1.5, p.outline) };
     painter.circle(view.at, radius, p.pane, edge);
-    let (letters, number) = view.tag.split_at(view.tag.find(|c: char| c.is_ascii_digit() || c == '-').unwrap_or(view.tag.len()));
+    let (letters, number) =
+        view.tag.split_at(view.tag.find(|c: char| c.is_ascii_digit() || c == '-').unwrap_or(view.tag.len()));
     let number = number.trim_start_matches('-');
     let size = (radius * 0.68).clamp(9.5, 13.0);
-    painter.text(view.at - vec2(0.0, radius * 0.36), Align2::CENTER_CENTER, letters, theme::bold_font(size), p.text);
-    painter.text(view.at + vec2(0.0, radius * 0.40), Align2::CENTER_CENTER, number, FontId::proportional(size), p.text);
+    painter.text(
+        view.at - vec2(0.0, radius * 0.36),
+        Align2::CENTER_CENTER,
+        letters,
+        theme::bold_font(size),
+        p.text,
+    );
+    painter.text(
+        view.at + vec2(0.0, radius * 0.40),
+        Align2::CENTER_CENTER,
+        number,
+        FontId::proportional(size),
+        p.text,
+    );
     if view.automatic.is_some() {
         painter.hline(view.at.x - radius..=view.at.x + radius, view.at.y + 0.5, Stroke::new(1.0, p.weak));
     }
@@ -172,10 +197,15 @@ pub fn valve(painter: &Painter, view: &ValveView, scale: f32, hovered: bool, p: 
     let r = valve_radius(scale);
     let open = (view.angle_deg / 90.0) as f32;
     let turn = |v: Vec2| if view.vertical { vec2(v.y, v.x) } else { v };
-    let stroke = Stroke::new(if hovered { 2.5 } else { 1.6 }, if hovered { p.accent_text } else { p.outline });
+    let stroke =
+        Stroke::new(if hovered { 2.5 } else { 1.6 }, if hovered { p.accent_text } else { p.outline });
     let fill = if open <= 0.0 { p.outline } else { p.body };
     for side in [-1.0, 1.0] {
-        let points = vec![view.at, view.at + turn(vec2(side * r, -0.72 * r)), view.at + turn(vec2(side * r, 0.72 * r))];
+        let points = vec![
+            view.at,
+            view.at + turn(vec2(side * r, -0.72 * r)),
+            view.at + turn(vec2(side * r, 0.72 * r)),
+        ];
         painter.add(Shape::convex_polygon(points, fill, stroke));
     }
     // The handle stands along the pipe when open, across it when shut.
@@ -208,24 +238,46 @@ pub fn valve_label(painter: &Painter, view: &ValveView, scale: f32, p: &Palette)
 /// The pump's circle with its triangle, tag and input.
 pub fn pump(painter: &Painter, view: &PumpView, scale: f32, hovered: bool, p: &Palette) {
     let r = bubble_radius(scale);
-    let edge = if view.dry { p.alarm } else if hovered { p.accent_text } else { p.outline };
+    let edge = if view.dry {
+        p.alarm
+    } else if hovered {
+        p.accent_text
+    } else {
+        p.outline
+    };
     painter.circle(view.at, r, p.body, Stroke::new(if hovered { 2.5 } else { 1.8 }, edge));
     let up = view.discharge.pipe.get(1).map_or(vec2(0.0, -1.0), |next| (*next - view.at).normalized());
     let across = up.rot90();
-    let points = vec![view.at + up * r * 0.85, view.at - up * r * 0.5 + across * r * 0.72, view.at - up * r * 0.5 - across * r * 0.72];
+    let points = vec![
+        view.at + up * r * 0.85,
+        view.at - up * r * 0.5 + across * r * 0.72,
+        view.at - up * r * 0.5 - across * r * 0.72,
+    ];
     painter.add(Shape::convex_polygon(points, p.pane, Stroke::new(1.2, p.outline)));
     let input = format!("{} {}", text::fixed(view.input, 2), view.unit);
     let flow = format!("{} cm³/s", text::fixed(view.discharge.flow_cm3_s, 1));
     if view.suction.pipe.is_empty() {
         let at = view.at - vec2(0.0, r + 3.0);
-        painter.text(at, Align2::CENTER_BOTTOM, format!("{}  {input}", view.tag), theme::bold_font(12.0), p.text);
+        painter.text(
+            at,
+            Align2::CENTER_BOTTOM,
+            format!("{}  {input}", view.tag),
+            theme::bold_font(12.0),
+            p.text,
+        );
     } else {
         let at = view.at + vec2(r * 0.2 + 2.0, r + 3.0);
         painter.text(at, Align2::CENTER_TOP, &view.tag, theme::bold_font(12.0), p.text);
         painter.text(at + vec2(0.0, 15.0), Align2::CENTER_TOP, input, FontId::proportional(12.0), p.mv);
         if let [_, corner, end, ..] = view.discharge.pipe[..] {
             let middle = corner + (end - corner) * 0.5;
-            painter.text(middle - vec2(0.0, 9.0), Align2::CENTER_BOTTOM, flow, FontId::proportional(12.0), p.weak);
+            painter.text(
+                middle - vec2(0.0, 9.0),
+                Align2::CENTER_BOTTOM,
+                flow,
+                FontId::proportional(12.0),
+                p.weak,
+            );
         }
     }
     if view.dry {
@@ -240,5 +292,8 @@ pub fn hint(painter: &Painter, rect: Rect, words: &str, p: &Palette) {
 
 /// Where to press a valve.
 pub fn valve_rect(view: &ValveView, scale: f32) -> Rect {
-    Rect::from_center_size(view.at, Vec2::splat(2.4 * valve_radius(scale)).max(egui::Vec2::splat(theme::PRESS)))
+    Rect::from_center_size(
+        view.at,
+        Vec2::splat(2.4 * valve_radius(scale)).max(egui::Vec2::splat(theme::PRESS)),
+    )
 }
