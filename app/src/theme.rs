@@ -20,6 +20,8 @@ pub const LINE: f32 = 1.8;
 
 /// Size of small print.
 pub const SMALL: f32 = 11.5;
+/// Size of text in dense tables.
+pub const TABLE: f32 = 12.0;
 /// Size of body text.
 pub const BODY: f32 = 13.0;
 
@@ -152,7 +154,7 @@ pub const LIGHT: Palette = Palette {
     caution: Color32::from_rgb(0x92, 0x4e, 0x05),
     grid: Color32::from_rgb(0xd2, 0xd5, 0xd4),
     ghost: Color32::from_rgb(0x6c, 0x72, 0x76),
-    shade: Color32::from_rgba_premultiplied(0x24, 0x40, 0x5a, 0x30),
+    shade: Color32::from_rgba_premultiplied(0x05, 0x0e, 0x17, 0x26),
     row: Color32::from_rgb(0xc9, 0xda, 0xe8),
 };
 

@@ -26,6 +26,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         return actions;
     };
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 4.0;
+        ui.spacing_mut().button_padding.x = 5.0;
         heading(ui, view, state, now, &mut actions);
         bars(ui, view, now);
         setpoint_keys(ui, view, now, &mut actions);
@@ -59,13 +61,13 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
     let pump = &network.pumps[now.pump];
     let unit = network.spec.pumps[now.pump].unit.symbol();
-    let height = (ui.available_height() - 282.0).clamp(64.0, 260.0);
+    let height = (ui.available_height() - 254.0).clamp(44.0, 260.0);
     let columns = [
         ("PV", now.pv_cm, 0.0, rim, "cm", 2, p.pv),
         ("SP", now.setpoint_cm, 0.0, rim, "cm", 2, p.sp),
         ("MV", now.mv, pump.min, pump.max, unit, 2, p.mv),
     ];
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 56.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 54.0), Sense::hover());
     response.widget_info(|| {
         let words = columns.map(|(n, v, .., u, d, _)| format!("{n} {} {u}", text::fixed(v, d))).join(", ");
         WidgetInfo::labeled(Role::Label, true, words)
@@ -165,15 +167,16 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let gains = settings.tuning.gains;
     let mut edited = settings.tuning;
     let mut filter_s = settings.pv_filter_s;
+    let width = ((ui.available_width() - 56.0) / 2.0).clamp(48.0, 84.0);
     let mut changed = false;
     let mut filter_changed = false;
     let mut done = false;
-    egui::Grid::new("tuning").num_columns(4).spacing([5.0, 3.0]).show(ui, |ui| {
+    egui::Grid::new("tuning").num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
         let mut field =
             |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
                 let name = ui.label(name).on_hover_text(&hint);
                 let drag = egui::DragValue::new(value).speed(speed).max_decimals(3).suffix(suffix);
-                let response = ui.add_sized([74.0, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
+                let response = ui.add_sized([width, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
                 done |= response.drag_stopped() || response.lost_focus();
                 response.changed()
             };

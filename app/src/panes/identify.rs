@@ -150,11 +150,13 @@ fn source(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<A
     let document = view.document;
     let is_log = document.source == SourceChoice::Log;
     if let (true, Some(log)) = (is_log, &document.log) {
-        ui.horizontal_wrapped(|ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let width = (ui.available_width() - 100.0) / 3.0;
             let mut roles = document.roles;
             let mut changed = false;
             for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
-                changed |= column_choice(ui, what, role, log);
+                changed |= column_choice(ui, what, role, log, width);
             }
             if changed {
                 actions.push(Action::Document(DocumentCommand::Roles(roles)));
@@ -194,7 +196,7 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let latest = view.document.model().or(view.document.models.last());
     let units = latest.map_or(String::new(), gain_unit);
     egui::ScrollArea::horizontal().id_salt("models").show(ui, |ui| {
-        egui::Grid::new("models").striped(true).spacing([10.0, 3.0]).show(ui, |ui| {
+        egui::Grid::new("models").striped(true).spacing([7.0, 3.0]).show(ui, |ui| {
             for title in [
                 tr!("identify.model"),
                 format!("K {units}"),
@@ -231,7 +233,7 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
             format!("{from}, {} … {}", text::clock(stretch.from_s), text::clock(stretch.to_s))
         }
     };
-    let name = format!("{} FOPDT", entry.number);
+    let name = entry.number.to_string();
     let button = ui.radio(chosen, name).on_hover_text(hover);
     if button.clicked() {
         actions.push(Action::Document(DocumentCommand::UseModel(entry.number)));
@@ -251,9 +253,10 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
     ];
     for (value, half) in cells {
         let plus = half.map_or(String::new(), |h| format!(" ±{}", text::brief(h)));
-        ui.label(format!("{}{plus}", text::brief(value)));
+        ui.label(RichText::new(format!("{}{plus}", text::brief(value))).size(theme::TABLE));
     }
-    ui.label(entry.fit.as_ref().map_or("–".to_owned(), |f| text::fixed(f.fit_percent, 1)));
+    let percent = entry.fit.as_ref().map_or("–".to_owned(), |f| text::fixed(f.fit_percent, 1));
+    ui.label(RichText::new(percent).size(theme::TABLE));
 }
 
 fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<Action>) {
@@ -290,7 +293,7 @@ fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut V
 fn verdict(ui: &mut egui::Ui, entry: &ModelEntry) {
     let p = theme::palette(ui);
     if let ProcessModel::Fopdt(model) = &entry.model {
-        ui.label(RichText::new(format!("θ/τ = {}", text::brief(model.dead_time_ratio()))).color(p.weak))
+        ui.label(RichText::new(format!("FOPDT · θ/τ = {}", text::brief(model.dead_time_ratio()))).color(p.weak))
             .on_hover_text(tr!("identify.ratio_hint"));
     }
     let Some(fit) = &entry.fit else { return };
@@ -315,14 +318,21 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
         time_s.iter().zip(values).step_by(thin).map(|(t, v)| [*t, *v]).collect::<Vec<[f64; 2]>>().into()
     };
     let unit = if entry.pv_unit.is_empty() { String::new() } else { format!(" [{}]", entry.pv_unit) };
+    ui.horizontal(|ui| {
+        for (words, colour) in [(tr!("identify.data"), p.ghost), (tr!("identify.model"), p.pv)] {
+            let (rect, _) = ui.allocate_exact_size(egui::vec2(14.0, 10.0), egui::Sense::hover());
+            ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.0, colour));
+            ui.label(RichText::new(words).size(theme::SMALL));
+        }
+    });
     Plot::new("overlay")
-        .height(ui.available_height().clamp(90.0, 220.0))
+        .height(ui.available_height().clamp(110.0, 420.0))
+        .y_axis_min_width(40.0)
         .allow_scroll(false)
         .y_axis_label(format!("PV{unit}"))
         .x_axis_label(tr!("trend.time_axis"))
         .x_axis_formatter(|mark, _| text::clock(mark.value))
         .grid_color(p.grid)
-        .legend(egui_plot::Legend::default().position(egui_plot::Corner::RightBottom))
         .show(ui, |plot| {
             plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
             plot.line(

@@ -113,6 +113,7 @@ fn curves(
         .y_axis_label(format!("{}{unit}", if is_pv { "PV" } else { "MV" }))
         .y_axis_min_width(38.0)
         .grid_color(p.grid)
+        .grid_spacing(egui::Rangef::new(16.0, 160.0))
         .include_y(0.0);
     if !is_pv {
         plot = plot.x_axis_label(tr!("step.time_axis"));

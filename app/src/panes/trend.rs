@@ -66,7 +66,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         state.was_log = is_log;
         state.follow = !is_log;
         let end_s = view.log.and_then(|l| l.table.time_s.last().copied()).unwrap_or(300.0);
-        state.bounds_s = if is_log { [-0.02 * end_s, 1.02 * end_s] } else { [0.0, 300.0] };
+        state.bounds_s = if is_log { [-0.02 * end_s, 1.05 * end_s] } else { [0.0, 300.0] };
     }
     let p = theme::palette(ui);
     header(ui, view, state, is_log, &mut actions);
@@ -88,7 +88,7 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
         if is_log {
             if ui.button(tr!("trend.whole")).clicked() {
                 let end_s = view.log.and_then(|l| l.table.time_s.last().copied()).unwrap_or(1.0);
-                state.bounds_s = [-0.02 * end_s, 1.02 * end_s];
+                state.bounds_s = [-0.02 * end_s, 1.05 * end_s];
             }
         } else {
             ui.checkbox(&mut state.follow, tr!("trend.follow"));

@@ -12,6 +12,9 @@ use crate::tuning::{PRESENT, Row};
 use crate::widgets::segmented;
 use crate::{i18n, text, theme, tr};
 
+/// Width of a column of figures.
+const COLUMN: f32 = 37.0;
+
 /// Form in which gains are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Form {
@@ -58,6 +61,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let below = 78.0;
     let height = (ui.available_height() - below).max(60.0);
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
+        ui.set_min_width(100.0 + 9.0 * (COLUMN + 3.0) + 14.0);
+        ui.spacing_mut().item_spacing.x = 3.0;
         table(ui, view, state, height, &mut actions);
     });
     details(ui, view, &mut actions);
@@ -102,32 +107,35 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
         .striped(true)
         .sense(egui::Sense::click())
         .cell_layout(egui::Layout::left_to_right(egui::Align::Center))
-        .column(Column::initial(148.0).at_least(110.0).clip(true))
-        .columns(Column::initial(42.0).at_least(34.0), 9)
+        .column(Column::remainder().at_least(100.0).clip(true))
+        .columns(Column::exact(COLUMN), 8)
+        .column(Column::exact(COLUMN + 6.0))
         .min_scrolled_height(40.0)
         .max_scroll_height(height - 36.0)
         .auto_shrink([false, true])
         .header(32.0, |mut header| {
             let small = |words: &str| RichText::new(words).size(theme::SMALL).color(p.weak);
+            let head = |words: &str| egui::Label::new(small(words)).extend();
             header.col(|ui| {
-                ui.label(small(&tr!("tune.rule")));
+                ui.add(head(&tr!("tune.rule")));
             });
             for title in &gains {
                 header.col(|ui| {
-                    ui.label(small(title));
+                    ui.add(head(title)).on_hover_text(title.replace('\n', " "));
                 });
             }
             for (title, hint) in &rest {
                 header.col(|ui| {
-                    ui.label(small(title)).on_hover_text(hint);
+                    ui.add(head(title)).on_hover_text(hint);
                 });
             }
         })
         .body(|body| {
             body.rows(22.0, rows.len(), |mut line| {
                 let row = rows[line.index()];
-                line.set_selected(chosen == Some((row.rule, row.kind)));
-                cells(&mut line, row, state, &p);
+                let selected = chosen == Some((row.rule, row.kind));
+                line.set_selected(selected);
+                cells(&mut line, row, state, if selected { p.on_accent } else { p.text });
                 if line.response().clicked() {
                     let candidate = Candidate {
                         rule: row.rule.to_owned(),
@@ -141,14 +149,13 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
         });
 }
 
-fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, p: &theme::Palette) {
-    let ink = if line.index() == usize::MAX { p.weak } else { p.text };
+fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink: egui::Color32) {
     let flagged = !row.valid || !row.analysis.stable;
     line.col(|ui| {
         let sign = if flagged { "! " } else { "" };
         let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
         let words = format!("{sign}{title} · {}", row.kind);
-        ui.add(egui::Label::new(RichText::new(words).color(ink)).truncate());
+        ui.add(egui::Label::new(RichText::new(&words).size(theme::TABLE).color(ink)).truncate()).on_hover_text(words);
     });
     let g = &row.gains;
     let none = |v: f64| if v == 0.0 || v.is_infinite() { "–".to_owned() } else { text::brief(v) };
@@ -158,12 +165,12 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, p: 
     };
     for cell in gains {
         line.col(|ui| {
-            ui.label(RichText::new(cell).color(ink));
+            ui.label(RichText::new(cell).size(theme::TABLE).color(ink));
         });
     }
     if !row.analysis.stable {
         line.col(|ui| {
-            ui.label(RichText::new(tr!("tune.unstable")).color(p.text));
+            ui.label(RichText::new(tr!("tune.unstable")).size(theme::TABLE).color(ink));
         });
         for _ in 0..5 {
             line.col(|_| {});
@@ -173,7 +180,7 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, p: 
     let a = &row.analysis;
     for value in [a.ms, a.mt, a.jv, a.ju, row.figures.iae_load, row.figures.overshoot_percent] {
         line.col(|ui| {
-            ui.label(RichText::new(text::maybe(value)).color(ink));
+            ui.label(RichText::new(text::maybe(value)).size(theme::TABLE).color(ink));
         });
     }
 }

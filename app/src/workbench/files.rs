@@ -165,7 +165,7 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
         ui.horizontal_wrapped(|ui| {
             let ImportSheet { log, roles, .. } = sheet;
             for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
-                column_choice(ui, what, role, &log.table);
+                column_choice(ui, what, role, &log.table, 130.0);
             }
         });
         if sheet.log.report.time_column.is_none() {
@@ -257,13 +257,15 @@ pub fn column_choice(
     what: &str,
     role: &mut Option<usize>,
     table: &vasos_engine::signal::LogTable,
+    width: f32,
 ) -> bool {
     let before = *role;
     let none = tr!("import_sheet.none");
     let name = |i: usize| table.columns.get(i).map_or_else(|| none.clone(), |c| c.name.clone());
     let label = ui.label(egui::RichText::new(what).family(theme::bold()));
+    let width = width.clamp(40.0, 160.0);
     egui::ComboBox::from_id_salt(what)
-        .width(120.0)
+        .width(width)
         .truncate()
         .selected_text(role.map_or_else(|| none.clone(), name))
         .show_ui(ui, |ui| {

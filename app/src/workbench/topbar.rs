@@ -175,12 +175,11 @@ impl Workbench {
         let chosen = usize::from(i18n::current() == Language::Portuguese);
         let names = ["EN".to_owned(), "PT".to_owned()];
         // The layout runs from right to left; the choice must not.
-        ui.scope(|ui| {
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                if let Some(i) = segmented(ui, &tr!("menu.language"), &names, chosen) {
-                    actions.push(Action::Language(Language::ALL[i]));
-                }
-            });
+        let size = egui::vec2(74.0, theme::PRESS);
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            if let Some(i) = segmented(ui, &tr!("menu.language"), &names, chosen) {
+                actions.push(Action::Language(Language::ALL[i]));
+            }
         });
         match &self.recording {
             Some(recording) => {
@@ -226,7 +225,7 @@ impl Workbench {
                     } else {
                         snapshot.speed
                     };
-                    tr!("status.running", speed = text::brief(reached))
+                    tr!("status.running", speed = text::fixed(reached, if reached < 9.95 { 1 } else { 0 }))
                 } else {
                     tr!("status.paused")
                 };
