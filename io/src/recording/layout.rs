@@ -5,7 +5,7 @@ use rerun::blueprint::{
     TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::external::re_sdk_types::VisualizableArchetype;
-use rerun::external::re_sdk_types::blueprint::components::PanelState;
+use rerun::external::re_sdk_types::blueprint::components::{PanelState, PlayState};
 use rerun::{Color, SeriesLines};
 use vasos_engine::plant::Network;
 use vasos_engine::signal::{ChannelKind, ChannelSet};
@@ -130,8 +130,9 @@ fn loop_title(network: &Network, slot: usize) -> String {
     tags.join(" / ")
 }
 
-/// How a viewer opens: trends on the left, the tanks and the events on the right.
-pub(super) fn blueprint(groups: &[Group]) -> Blueprint {
+/// How a viewer opens: trends on the left, the tanks and the events on the right. With it, the paths of the trends
+/// in the blueprint.
+pub(super) fn blueprint(groups: &[Group]) -> (Blueprint, Vec<String>) {
     let mut trends: Vec<ContainerLike> = Vec::new();
     let mut shares: Vec<f32> = Vec::new();
     for group in groups {
@@ -150,14 +151,21 @@ pub(super) fn blueprint(groups: &[Group]) -> Blueprint {
     let tanks = Spatial2DView::new("Tanks").with_origin(RIG).with_contents([format!("/{RIG}/**")]);
     let events = TextLogView::new("Events").with_origin(EVENTS).with_contents([format!("/{EVENTS}")]);
     let right = Vertical::new([tanks.into(), events.into()]).with_row_shares([3.0, 2.0]);
+    let view_path = |c: &ContainerLike| match c {
+        ContainerLike::View(view) => Some(view.blueprint_path().to_string()),
+        _ => None,
+    };
+    let paths = trends.iter().filter_map(view_path).collect();
     let left = Vertical::new(trends).with_row_shares(shares);
     let root = Horizontal::new([left.into(), right.into()]).with_column_shares([3.0, 2.0]);
-    Blueprint::new(root)
+    let time = TimePanel::new().with_timeline(TIME).with_play_state(PlayState::Following);
+    let blueprint = Blueprint::new(root)
         .with_auto_layout(false)
         .with_auto_views(false)
         .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
         .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
-        .with_time_panel(TimePanel::new().with_timeline(TIME).with_state(PanelState::Collapsed))
+        .with_time_panel(time.with_state(PanelState::Collapsed));
+    (blueprint, paths)
 }
 
 fn trend(group: &Group, title: &str, shown: &[bool]) -> ContainerLike {

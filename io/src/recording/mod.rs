@@ -25,6 +25,7 @@
 //! units in brackets. A value that does not exist, such as the PV before the first sample, is NaN.
 
 mod layout;
+mod opening;
 mod output;
 mod read;
 mod run_sink;

@@ -12,7 +12,7 @@ const WIDTH: f32 = 0.62;
 /// Outlines that fill a tank's water: the viewer fills no boxes, so that thick outlines are stacked.
 const SLICES: usize = 3;
 /// Level change in cm that is worth a new frame.
-const VISIBLE_CM: f32 = 0.02;
+const VISIBLE_CM: f32 = 0.1;
 
 /// Left, top, width and height of a tank; y grows downwards, one unit is 1 cm of level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +88,11 @@ impl Tanks {
             colors.push(Color::from_rgb(110, 205, 130));
         }
         LineStrips2D::new(strips).with_labels(labels).with_show_labels(true).with_colors(colors)
+    }
+
+    /// Whether there is a frame.
+    pub fn is_drawn(&self) -> bool {
+        self.drawn_cm.iter().all(|level| level.is_finite())
     }
 
     /// Whether a level has moved visibly since the last frame.

@@ -5,13 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};
-use rerun::blueprint::BlueprintActivation;
 use rerun::{Boxes2D, RecordingStream, RecordingStreamBuilder, Scalars, TextLog, TimeColumn};
 use vasos_engine::plant::Network;
 use vasos_engine::session::Event;
 use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
 
-use super::layout::{EVENTS, Group, RIG, TIME, WALL_CLOCK, blueprint, groups};
+use super::layout::{EVENTS, Group, RIG, TIME, WALL_CLOCK, groups};
+use super::opening::blueprint_messages;
 use super::output::Output;
 use super::run_sink::Message;
 use super::status::Status;
@@ -118,8 +118,9 @@ impl Writer {
             .buffered()?;
         stream.set_sink(Box::new(self.output.clone()));
         let groups = groups(&channels, network);
-        let activation = BlueprintActivation { make_active: true, make_default: true };
-        blueprint(&groups).send(&stream, activation)?;
+        for message in blueprint_messages(&groups)? {
+            stream.record_msg(message);
+        }
         for group in &groups {
             stream.log_static(group.path.as_str(), &group.series(&group.shown))?;
         }
@@ -192,8 +193,12 @@ impl Run {
         let frames = if count <= 2 * MOST_FRAMES { 1 } else { MOST_FRAMES };
         let (mut time_s, mut wall_ns) = (vec![], vec![]);
         let (mut centers, mut halves, mut radii, mut lengths) = (vec![], vec![], vec![], vec![]);
-        for frame in 1..=frames {
-            let row = frame * count / frames - 1;
+        for frame in 0..=frames {
+            // The first row of all is drawn as well; of other batches the last of each part.
+            let row = (frame * count / frames).saturating_sub(1);
+            if frame == 0 && self.tanks.is_drawn() {
+                continue;
+            }
             let values = &rows.values[row * width..(row + 1) * width];
             let levels: Vec<f32> = self.levels.iter().map(|&c| values[c] as f32).collect();
             if !self.tanks.moved(&levels) {
