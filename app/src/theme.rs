@@ -18,6 +18,9 @@ pub const PRESS: f32 = 24.0;
 /// Width of plotted lines.
 pub const LINE: f32 = 1.8;
 
+/// Width of a trend's lines, which carry noise.
+pub const TREND_LINE: f32 = 1.4;
+
 /// Size of small print.
 pub const SMALL: f32 = 11.5;
 /// Size of text in dense tables.

@@ -167,10 +167,11 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let gains = settings.tuning.gains;
     let mut edited = settings.tuning;
     let mut filter_s = settings.pv_filter_s;
-    let width = ((ui.available_width() - 56.0) / 2.0).clamp(48.0, 84.0);
+    let width = ((ui.available_width() - 66.0) / 2.0).clamp(48.0, 84.0);
     let mut changed = false;
     let mut filter_changed = false;
     let mut done = false;
+    ui.style_mut().drag_value_text_style = egui::TextStyle::Small;
     egui::Grid::new("tuning").num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
         let mut field =
             |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {

@@ -1,7 +1,7 @@
 //! Signals over time: PV and SP above, MV below, on one time axis. Drag to pan, scroll to zoom, brush to choose a
 //! stretch for identification.
 
-use eframe::egui::{self, Color32, Id, vec2};
+use eframe::egui::{self, Color32, Id, Role, WidgetInfo, vec2};
 use egui_plot::{GridMark, HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine};
 use vasos_engine::document::{DocumentCommand, SourceChoice, Stretch};
 use vasos_engine::signal::{ChannelKind, Pyramid};
@@ -95,14 +95,13 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
             let label =
                 |span: Option<f64>| span.map_or_else(|| tr!("trend.all"), |s| format!("{} min", s / 60.0));
             let before = state.span;
-            egui::ComboBox::from_id_salt("span")
-                .width(70.0)
-                .selected_text(label(SPANS_S[state.span]))
-                .show_ui(ui, |ui| {
-                    for (i, span) in SPANS_S.into_iter().enumerate() {
-                        ui.selectable_value(&mut state.span, i, label(span));
-                    }
-                });
+            let combo = egui::ComboBox::from_id_salt("span").width(70.0).selected_text(label(SPANS_S[state.span]));
+            let combo = combo.show_ui(ui, |ui| {
+                for (i, span) in SPANS_S.into_iter().enumerate() {
+                    ui.selectable_value(&mut state.span, i, label(span));
+                }
+            });
+            combo.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, tr!("trend.span")));
             state.follow |= before != state.span;
             ui.checkbox(&mut state.tanks, tr!("trend.tanks")).on_hover_text(tr!("trend.tanks_hint"));
         }
@@ -274,6 +273,7 @@ fn plot(
         .show_axes([true, true])
         .grid_color(p.grid)
         .set_margin_fraction(vec2(0.0, 0.12))
+        .grid_spacing(egui::Rangef::new(9.0, 90.0))
         .label_formatter(move |position| {
             let at = |point: &PlotPoint| format!("{}\n{}", text::clock(point.x), text::fixed(point.y, 3));
             match position {
@@ -345,7 +345,7 @@ fn draw_curves(
         }
         let stepped = curve.steps && points.len() < 2 * pixels;
         let line: Vec<[f64; 2]> = if stepped { steps(&points, bounds[1]) } else { points.clone() };
-        let width = if curve.thin { 1.2 } else { theme::LINE };
+        let width = if curve.thin { 1.0 } else { theme::TREND_LINE };
         let line = Line::new(curve.name.clone(), PlotPoints::from(line)).color(curve.colour).width(width);
         plot_ui.line(line);
     }

@@ -13,7 +13,11 @@ use crate::widgets::segmented;
 use crate::{i18n, text, theme, tr};
 
 /// Width of a column of figures.
-const COLUMN: f32 = 37.0;
+const COLUMN: f32 = 35.0;
+/// Height of a row.
+const ROW: f32 = 24.0;
+/// Height of the two lines of titles.
+const HEAD: f32 = 32.0;
 
 /// Form in which gains are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -62,7 +66,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let height = (ui.available_height() - below).max(60.0);
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
         ui.set_min_width(100.0 + 9.0 * (COLUMN + 3.0) + 14.0);
-        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().item_spacing = egui::vec2(3.0, 0.0);
         table(ui, view, state, height, &mut actions);
     });
     details(ui, view, &mut actions);
@@ -111,9 +115,9 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
         .columns(Column::exact(COLUMN), 8)
         .column(Column::exact(COLUMN + 6.0))
         .min_scrolled_height(40.0)
-        .max_scroll_height(height - 36.0)
+        .max_scroll_height(((height - HEAD - 14.0) / ROW).floor().max(1.0) * ROW)
         .auto_shrink([false, true])
-        .header(32.0, |mut header| {
+        .header(HEAD, |mut header| {
             let small = |words: &str| RichText::new(words).size(theme::SMALL).color(p.weak);
             let head = |words: &str| egui::Label::new(small(words)).extend();
             header.col(|ui| {
@@ -131,7 +135,7 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
             }
         })
         .body(|body| {
-            body.rows(22.0, rows.len(), |mut line| {
+            body.rows(ROW, rows.len(), |mut line| {
                 let row = rows[line.index()];
                 let selected = chosen == Some((row.rule, row.kind));
                 line.set_selected(selected);

@@ -1,0 +1,286 @@
+//! The window as a user meets it, driven through its accessible names, without a display.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use vasos_app::action::Action;
+use vasos_app::panes::PaneKind;
+use vasos_app::panes::pid::layout::Layout;
+use vasos_app::panes::pid::model::PidModel;
+use vasos_app::workbench::{Options, Workbench};
+use vasos_engine::control::{Mode, PidGains, PidTuning};
+use vasos_engine::document::{Candidate, DocumentCommand, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
+use vasos_engine::model::{Fopdt, ProcessModel};
+use vasos_engine::session::RigCommand;
+
+type Window<'a> = Harness<'a, Workbench>;
+
+fn window<'a>(size: [f32; 2]) -> Window<'a> {
+    let options = Options { paused: true, forget: true, ..Options::default() };
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_max_steps(12)
+        .wgpu()
+        .build_eframe(|cc| Workbench::new(&cc.egui_ctx, options).expect("the preset starts"));
+    harness.run_steps(3);
+    harness
+}
+
+fn act(harness: &mut Window, action: Action) {
+    let ctx = harness.ctx.clone();
+    harness.state_mut().act(&ctx, action);
+    harness.run_steps(1);
+}
+
+fn wait(harness: &mut Window, what: &str, mut done: impl FnMut(&Workbench) -> bool) {
+    let start = Instant::now();
+    while !done(harness.state()) {
+        assert!(start.elapsed() < Duration::from_secs(20), "waited in vain for: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+        harness.run_steps(1);
+    }
+    harness.run_steps(2);
+}
+
+fn step(harness: &mut Window, samples: u64) {
+    let wanted = harness.state().snapshot().samples + samples;
+    for _ in 0..samples {
+        act(harness, Action::Step);
+    }
+    wait(harness, "samples", |w| w.snapshot().samples >= wanted);
+}
+
+fn model_command() -> DocumentCommand {
+    DocumentCommand::AddModel(Box::new(NewModel {
+        model: ProcessModel::Fopdt(Fopdt::new(4.9, 152.0, 2.0).expect("usable")),
+        origin: ModelOrigin::Typed,
+        fit: None,
+        pv_unit: "cm".to_owned(),
+        mv_unit: "V".to_owned(),
+    }))
+}
+
+/// The issue: a test turns a valve and finds the drawn flow equal to the snapshot's; levels, flows and arrows follow
+/// through coupled, decoupled, reversed flow between TQ1 and TQ2, overflow and empty.
+#[test]
+fn the_drawing_shows_what_is() {
+    let mut harness = window([1440.0, 900.0]);
+    let drawn = |h: &Window| {
+        let snapshot = h.state().snapshot();
+        let layout = Layout::of(&snapshot.network);
+        let rect = eframe::egui::Rect::from_min_size(eframe::egui::Pos2::ZERO, eframe::egui::vec2(500.0, 400.0));
+        let model = PidModel::new(&snapshot, &layout, rect);
+        for (view, now) in model.valves.iter().zip(&snapshot.valves) {
+            assert_eq!(view.stream.flow_cm3_s, now.flow_cm3_s, "{}", view.tag);
+            assert_eq!(view.angle_deg, now.angle_deg);
+        }
+        for (view, now) in model.pumps.iter().zip(&snapshot.pumps) {
+            assert_eq!(view.discharge.flow_cm3_s, now.arriving_cm3_s);
+        }
+        for (view, now) in model.tanks.iter().zip(&snapshot.tanks) {
+            assert_eq!(view.level_cm, now.level_cm);
+            let share = (view.rect.bottom() - view.surface_y) / view.rect.height();
+            assert!((f64::from(share) - now.level_cm / view.height_cm).abs() < 1e-5);
+        }
+        model
+    };
+    // Coupled, at rest: FV01 flows, the pair is still.
+    step(&mut harness, 1);
+    let model = drawn(&harness);
+    assert_eq!([model.valves[0].stream.direction(), model.valves[2].stream.direction()], [1, 1]);
+    // FV01 turned by its accessible name: more flow than before, and drawn so.
+    let before = model.valves[0].stream.flow_cm3_s;
+    harness.get_by_label("Valve FV01").focus();
+    harness.run_steps(2);
+    for _ in 0..15 {
+        harness.key_press(eframe::egui::Key::ArrowUp);
+        harness.run_steps(1);
+    }
+    step(&mut harness, 2);
+    let model = drawn(&harness);
+    assert!((model.valves[0].angle_deg - 45.0).abs() < 1e-9, "{}", model.valves[0].angle_deg);
+    assert!(model.valves[0].stream.flow_cm3_s > 2.0 * before);
+    // TQ1 sinks below TQ2: the stream between them turns round.
+    step(&mut harness, 40);
+    let model = drawn(&harness);
+    assert_eq!(model.valves[1].stream.direction(), -1, "{} cm³/s", model.valves[1].stream.flow_cm3_s);
+    // Overflow: TQ1 filled to the brim while the pump runs.
+    act(&mut harness, Action::Undo);
+    act(&mut harness, Action::Rig(RigCommand::Bump { tag: "TQ1".to_owned(), delta_cm: 27.0 }));
+    act(&mut harness, Action::Document(DocumentCommand::Angle("FV01".to_owned(), 0.0)));
+    act(&mut harness, Action::Document(DocumentCommand::Angle("FV02".to_owned(), 0.0)));
+    step(&mut harness, 10);
+    let model = drawn(&harness);
+    assert!(model.tanks[0].spill_cm3_s > 0.0);
+    assert_eq!([model.valves[0].stream.direction(), model.valves[1].stream.direction()], [0, 0]);
+    // Empty: TQ3 has nothing left to give.
+    act(&mut harness, Action::Rig(RigCommand::Bump { tag: "TQ3".to_owned(), delta_cm: -27.0 }));
+    step(&mut harness, 5);
+    let model = drawn(&harness);
+    assert_eq!(model.tanks[2].level_cm, 0.0);
+    assert_eq!(model.valves[2].stream.direction(), 0);
+    // Decoupled: TQ2 is shut off, FV01 open.
+    act(&mut harness, Action::Document(DocumentCommand::Configuration(1)));
+    step(&mut harness, 5);
+    let model = drawn(&harness);
+    assert_eq!((model.valves[0].angle_deg, model.valves[1].angle_deg, model.valves[2].angle_deg), (90.0, 0.0, 30.0));
+    assert_eq!(model.valves[0].stream.direction(), 1);
+    assert!(model.bubbles.iter().any(|b| b.tag == "LIC-03" && b.automatic == Some(true)));
+}
+
+#[test]
+fn the_loop_is_operated_from_the_faceplate_and_every_setting_is_taken_back() {
+    let mut harness = window([1440.0, 900.0]);
+    harness.get_by_label("Mode: Man").click();
+    harness.run_steps(2);
+    wait(&mut harness, "manual", |w| w.snapshot().loops[0].mode == Mode::Manual);
+    let mv = harness.state().snapshot().loops[0].mv;
+    harness.get_by_label("+10 %").click();
+    wait(&mut harness, "a higher output", |w| (w.snapshot().loops[0].mv - mv - 0.25).abs() < 1e-9);
+    harness.get_by_label("Mode: Auto").click();
+    wait(&mut harness, "automatic", |w| w.snapshot().loops[0].mode == Mode::Automatic);
+    harness.get_by_label("+1 %").click();
+    wait(&mut harness, "a new setpoint", |w| (w.snapshot().loops[0].setpoint_cm - 15.27).abs() < 1e-9);
+    act(&mut harness, Action::Undo);
+    wait(&mut harness, "the old setpoint", |w| w.snapshot().loops[0].setpoint_cm == 15.0);
+    act(&mut harness, Action::Redo);
+    wait(&mut harness, "the new setpoint", |w| (w.snapshot().loops[0].setpoint_cm - 15.27).abs() < 1e-9);
+    for _ in 0..10 {
+        act(&mut harness, Action::Undo);
+    }
+    wait(&mut harness, "the beginning", |w| w.snapshot().loops[0].setpoint_cm == 15.0 && w.snapshot().loops[0].mode == Mode::Automatic);
+    act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 31.0)));
+    let said = harness.state().journal().back().expect("an entry").words.clone();
+    assert!(said.contains("31") && said.contains("27"), "{said}");
+    assert_eq!(harness.state().document().rig.loops["LIC-02"].setpoint_cm, 15.0, "nothing is lost");
+}
+
+/// The whole way of an engineer: a log onto the window, columns, a stretch, a model, a rule, the loop.
+#[test]
+fn from_a_dropped_log_to_a_tuned_loop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("step.csv");
+    let mut text = "time;level [cm];pump [V]\n".to_owned();
+    for i in 0..1200 {
+        let t = f64::from(i);
+        let y = if t <= 62.0 { 10.0 } else { 10.0 + 4.9 * 0.2 * (1.0 - (-(t - 62.0) / 80.0).exp()) };
+        let noise = 0.01 * (t * 12.9898).sin();
+        text.push_str(&format!("{t};{};{}\n", y + noise, if t >= 60.0 { 2.2 } else { 2.0 }).replace('.', ","));
+    }
+    std::fs::write(&path, text).expect("written");
+    let mut harness = window([1440.0, 900.0]);
+    drop_on(&mut harness, path);
+    wait(&mut harness, "the import", |w| !w.is_busy());
+    harness.run_steps(3);
+    harness.get_by_label("Use this log").click();
+    wait(&mut harness, "the log", |w| w.document().log.is_some());
+    let roles = harness.state().document().roles;
+    assert_eq!(roles, LogRoles { pv: Some(0), sp: None, mv: Some(1) });
+    assert_eq!(harness.state().document().source, SourceChoice::Log);
+    let stretch = Stretch { from_s: 20.0, to_s: 900.0 };
+    act(&mut harness, Action::Document(DocumentCommand::Stretch(Some(stretch))));
+    harness.get_by_label("Fit model").click();
+    wait(&mut harness, "a model", |w| w.document().model().is_some());
+    let fit = harness.state().document().model().and_then(|m| m.fit.clone()).expect("fitted");
+    let m = fit.model;
+    assert!((m.gain - 4.9).abs() < 0.02 && (m.time_constant_s - 80.0).abs() < 1.0 && (m.dead_time_s - 2.0).abs() < 0.3, "{m:?}");
+    let candidate = Candidate { rule: "simc".to_owned(), controller: "pi".to_owned(), gains: PidGains::pi(1.0, 1.0) };
+    act(&mut harness, Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    harness.run_steps(2);
+    harness.get_by_label("Apply to LIC-02").click();
+    // SIMC: Kc = T/(K·2L), Ti = min(T, 8L).
+    let expected = m.time_constant_s / (m.gain * 2.0 * m.dead_time_s);
+    wait(&mut harness, "the tuning", |w| (w.snapshot().loops[0].tuning.gains.kc - expected).abs() < 1e-9);
+    act(&mut harness, Action::Undo);
+    wait(&mut harness, "the old tuning", |w| w.snapshot().loops[0].tuning == PidTuning::new(PidGains::pi(1.8, 152.0)));
+}
+
+fn drop_on(harness: &mut Window, path: PathBuf) {
+    let ctx = harness.ctx.clone();
+    harness.state_mut().act(&ctx, Action::OpenFile(path));
+    harness.run_steps(1);
+}
+
+/// The issue: bad input gets a clear error and loses nothing.
+#[test]
+fn bad_files_get_a_clear_error_and_lose_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path
+    };
+    let damaged = include_str!("../../assets/rigs/stad.toml").replace("area_cm2 = 150.0", "area_cm2 = -150.0");
+    let cases = [
+        (write("one_row.csv", "time,pv,mv\n0,1,2\n"), "one row"),
+        (write("text.csv", "some words\nand more of them\nno numbers here\n"), "no rows of numbers"),
+        (write("empty.csv", ""), "empty"),
+        (write("damaged.toml", &damaged), "area_cm2 = -150"),
+        (write("cut.toml", &damaged[..400]), "line"),
+        (folder.path().to_owned(), "folder"),
+        (folder.path().join("nowhere.csv"), "cannot be read"),
+    ];
+    let mut harness = window([1440.0, 900.0]);
+    act(&mut harness, Action::Document(model_command()));
+    for (path, words) in cases {
+        let before = harness.state().journal().len();
+        drop_on(&mut harness, path.clone());
+        wait(&mut harness, words, |w| !w.is_busy() && w.journal().len() > before);
+        let said = harness.state().journal().back().expect("an entry").words.clone();
+        assert!(said.contains(words), "{}: {said}", path.display());
+        assert!(harness.state().document().model().is_some() && harness.state().document().log.is_none());
+        assert_eq!(harness.state().snapshot().network.spec.id, "stad");
+    }
+}
+
+/// Every pane alone and the whole window, in both themes and both sizes: pictures to look at, compared with the last.
+#[test]
+fn the_window_looks_as_it_did() {
+    let mut results = egui_kittest::SnapshotResults::new();
+    for (name, size) in [("1440x900", [1440.0, 900.0]), ("1280x720", [1280.0, 720.0]), ("panes", [900.0, 600.0])] {
+        for dark in [true, false] {
+            let mut harness = window(size);
+            if !dark {
+                act(&mut harness, Action::ToggleTheme);
+            }
+            act(&mut harness, Action::Document(model_command()));
+            for i in 0..240 {
+                if i == 40 {
+                    act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 16.0)));
+                }
+                act(&mut harness, Action::Step);
+            }
+            let theme = if dark { "dark" } else { "light" };
+            wait(&mut harness, "240 samples", |w| w.snapshot().samples == 240 && w.run().end_s() > 47.7);
+            harness.remove_cursor();
+            harness.run_steps(2);
+            if name == "panes" {
+                for kind in PaneKind::ALL {
+                    act(&mut harness, Action::Maximise(kind));
+                    harness.run_steps(2);
+                    picture(&mut harness, &format!("pane_{kind:?}_{theme}").to_lowercase());
+                    act(&mut harness, Action::Maximise(kind));
+                }
+                results.extend_harness(&mut harness);
+                continue;
+            }
+            picture(&mut harness, &format!("coupled_{theme}_{name}"));
+            act(&mut harness, Action::Document(DocumentCommand::Configuration(1)));
+            for _ in 0..60 {
+                act(&mut harness, Action::Step);
+            }
+            wait(&mut harness, "300 samples", |w| w.snapshot().samples == 300 && w.run().end_s() > 59.7);
+            harness.run_steps(2);
+            picture(&mut harness, &format!("decoupled_{theme}_{name}"));
+            results.extend_harness(&mut harness);
+        }
+    }
+}
+
+fn picture(harness: &mut Window, name: &str) {
+    // Software renderers of other versions differ by a little in antialiasing.
+    let options = egui_kittest::SnapshotOptions::new().threshold(1.5).max_failed_pixels(1500);
+    harness.snapshot_options(name, &options);
+}
