@@ -16,7 +16,7 @@ use vasos_io::rig::{PRESETS, preset};
 
 const HOUR_S: f64 = 3600.0;
 
-/// About what a step test on TQ2 of the STAD rig gives: cm per unit of the pump, seconds.
+/// The model published for TQ2 of the STAD rig: cm per V, seconds.
 fn model() -> Fopdt {
     Fopdt::new(4.9, 152.0, 2.0).expect("a model")
 }
