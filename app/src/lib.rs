@@ -11,6 +11,7 @@ pub mod cli;
 pub mod i18n;
 pub mod journal;
 pub mod panes;
+pub mod plots;
 pub mod text;
 pub mod theme;
 pub mod traces;

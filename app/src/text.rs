@@ -30,6 +30,18 @@ pub fn brief(value: f64) -> String {
     fixed(value, (2.0 - magnitude).clamp(0.0, 6.0) as usize)
 }
 
+/// The unit of a quotient of two, written the short way where there is one.
+#[must_use]
+pub fn quotient(over: &str, under: &str) -> String {
+    let known = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
+    match (over, under) {
+        ("cm³/s", "cm") => "cm²/s".to_owned(),
+        ("cm", "cm³/s") => "s/cm²".to_owned(),
+        (_, u) if u.contains(['/', '·']) => format!("{}/({u})", known(over)),
+        _ => format!("{}/{}", known(over), known(under)),
+    }
+}
+
 /// A number that may not exist.
 #[must_use]
 pub fn maybe(value: Option<f64>) -> String {

@@ -66,15 +66,15 @@ struct Key {
 }
 
 impl TuningTable {
-    /// Brings the table in line with the document; does nothing when it is.
-    pub fn update(&mut self, document: &Document) {
+    /// Brings the table in line with the document and the loop in view; does nothing when it is.
+    pub fn update(&mut self, document: &Document, focus: usize) {
         let Some(entry) = document.model() else {
             if self.key.is_some() {
                 *self = Self::default();
             }
             return;
         };
-        let key = key(document, entry);
+        let key = key(document, entry, focus);
         if self.key.as_ref() == Some(&key) {
             return;
         }
@@ -127,8 +127,8 @@ impl TuningTable {
     }
 }
 
-fn key(document: &Document, entry: &ModelEntry) -> Key {
-    let tag = document.rig.active_loops().first().map(|l| l.id.clone());
+fn key(document: &Document, entry: &ModelEntry, focus: usize) -> Key {
+    let tag = document.rig.active_loops().get(focus).map(|l| l.id.clone());
     let present = tag.and_then(|t| document.rig.loops.get(&t)).map(|l| l.tuning.gains);
     Key {
         number: entry.number,

@@ -11,7 +11,9 @@ use vasos_app::panes::pid::layout::Layout;
 use vasos_app::panes::pid::model::PidModel;
 use vasos_app::workbench::{Options, Workbench};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
-use vasos_engine::document::{Candidate, DocumentCommand, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
+use vasos_engine::document::{
+    Candidate, DocumentCommand, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch,
+};
 use vasos_engine::model::{Fopdt, ProcessModel};
 use vasos_engine::session::RigCommand;
 
@@ -70,7 +72,8 @@ fn the_drawing_shows_what_is() {
     let drawn = |h: &Window| {
         let snapshot = h.state().snapshot();
         let layout = Layout::of(&snapshot.network);
-        let rect = eframe::egui::Rect::from_min_size(eframe::egui::Pos2::ZERO, eframe::egui::vec2(500.0, 400.0));
+        let rect =
+            eframe::egui::Rect::from_min_size(eframe::egui::Pos2::ZERO, eframe::egui::vec2(500.0, 400.0));
         let model = PidModel::new(&snapshot, &layout, rect);
         for (view, now) in model.valves.iter().zip(&snapshot.valves) {
             assert_eq!(view.stream.flow_cm3_s, now.flow_cm3_s, "{}", view.tag);
@@ -125,7 +128,10 @@ fn the_drawing_shows_what_is() {
     act(&mut harness, Action::Document(DocumentCommand::Configuration(1)));
     step(&mut harness, 5);
     let model = drawn(&harness);
-    assert_eq!((model.valves[0].angle_deg, model.valves[1].angle_deg, model.valves[2].angle_deg), (90.0, 0.0, 30.0));
+    assert_eq!(
+        (model.valves[0].angle_deg, model.valves[1].angle_deg, model.valves[2].angle_deg),
+        (90.0, 0.0, 30.0)
+    );
     assert_eq!(model.valves[0].stream.direction(), 1);
     assert!(model.bubbles.iter().any(|b| b.tag == "LIC-03" && b.automatic == Some(true)));
 }
@@ -150,7 +156,9 @@ fn the_loop_is_operated_from_the_faceplate_and_every_setting_is_taken_back() {
     for _ in 0..10 {
         act(&mut harness, Action::Undo);
     }
-    wait(&mut harness, "the beginning", |w| w.snapshot().loops[0].setpoint_cm == 15.0 && w.snapshot().loops[0].mode == Mode::Automatic);
+    wait(&mut harness, "the beginning", |w| {
+        w.snapshot().loops[0].setpoint_cm == 15.0 && w.snapshot().loops[0].mode == Mode::Automatic
+    });
     act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 31.0)));
     let said = harness.state().journal().back().expect("an entry").words.clone();
     assert!(said.contains("31") && said.contains("27"), "{said}");
@@ -167,7 +175,9 @@ fn from_a_dropped_log_to_a_tuned_loop() {
         let t = f64::from(i);
         let y = if t <= 62.0 { 10.0 } else { 10.0 + 4.9 * 0.2 * (1.0 - (-(t - 62.0) / 80.0).exp()) };
         let noise = 0.01 * (t * 12.9898).sin();
-        text.push_str(&format!("{t};{};{}\n", y + noise, if t >= 60.0 { 2.2 } else { 2.0 }).replace('.', ","));
+        text.push_str(
+            &format!("{t};{};{}\n", y + noise, if t >= 60.0 { 2.2 } else { 2.0 }).replace('.', ","),
+        );
     }
     std::fs::write(&path, text).expect("written");
     let mut harness = window([1440.0, 900.0]);
@@ -185,8 +195,14 @@ fn from_a_dropped_log_to_a_tuned_loop() {
     wait(&mut harness, "a model", |w| w.document().model().is_some());
     let fit = harness.state().document().model().and_then(|m| m.fit.clone()).expect("fitted");
     let m = fit.model;
-    assert!((m.gain - 4.9).abs() < 0.02 && (m.time_constant_s - 80.0).abs() < 1.0 && (m.dead_time_s - 2.0).abs() < 0.3, "{m:?}");
-    let candidate = Candidate { rule: "simc".to_owned(), controller: "pi".to_owned(), gains: PidGains::pi(1.0, 1.0) };
+    assert!(
+        (m.gain - 4.9).abs() < 0.02
+            && (m.time_constant_s - 80.0).abs() < 1.0
+            && (m.dead_time_s - 2.0).abs() < 0.3,
+        "{m:?}"
+    );
+    let candidate =
+        Candidate { rule: "simc".to_owned(), controller: "pi".to_owned(), gains: PidGains::pi(1.0, 1.0) };
     act(&mut harness, Action::Document(DocumentCommand::Candidate(Some(candidate))));
     harness.run_steps(2);
     harness.get_by_label("Apply to LIC-02").click();
@@ -194,7 +210,9 @@ fn from_a_dropped_log_to_a_tuned_loop() {
     let expected = m.time_constant_s / (m.gain * 2.0 * m.dead_time_s);
     wait(&mut harness, "the tuning", |w| (w.snapshot().loops[0].tuning.gains.kc - expected).abs() < 1e-9);
     act(&mut harness, Action::Undo);
-    wait(&mut harness, "the old tuning", |w| w.snapshot().loops[0].tuning == PidTuning::new(PidGains::pi(1.8, 152.0)));
+    wait(&mut harness, "the old tuning", |w| {
+        w.snapshot().loops[0].tuning == PidTuning::new(PidGains::pi(1.8, 152.0))
+    });
 }
 
 fn drop_on(harness: &mut Window, path: PathBuf) {
@@ -212,7 +230,8 @@ fn bad_files_get_a_clear_error_and_lose_nothing() {
         std::fs::write(&path, text).expect("written");
         path
     };
-    let damaged = include_str!("../../assets/rigs/stad.toml").replace("area_cm2 = 150.0", "area_cm2 = -150.0");
+    let damaged =
+        include_str!("../../assets/rigs/stad.toml").replace("area_cm2 = 150.0", "area_cm2 = -150.0");
     let cases = [
         (write("one_row.csv", "time,pv,mv\n0,1,2\n"), "one row"),
         (write("text.csv", "some words\nand more of them\nno numbers here\n"), "no rows of numbers"),
@@ -239,7 +258,9 @@ fn bad_files_get_a_clear_error_and_lose_nothing() {
 #[test]
 fn the_window_looks_as_it_did() {
     let mut results = egui_kittest::SnapshotResults::new();
-    for (name, size) in [("1440x900", [1440.0, 900.0]), ("1280x720", [1280.0, 720.0]), ("panes", [900.0, 600.0])] {
+    for (name, size) in
+        [("1440x900", [1440.0, 900.0]), ("1280x720", [1280.0, 720.0]), ("panes", [900.0, 600.0])]
+    {
         for dark in [true, false] {
             let mut harness = window(size);
             if !dark {

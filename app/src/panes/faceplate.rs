@@ -13,7 +13,8 @@ use crate::{text, theme, tr};
 /// State of the pane.
 #[derive(Default)]
 pub struct State {
-    shown: usize,
+    /// The loop in view: what is identified, compared and tuned is this one.
+    pub shown: usize,
 }
 
 /// Draws the pane.
@@ -182,8 +183,14 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
                 response.changed()
             };
         let speed = |v: f64| (v.abs() / 100.0).max(0.001);
-        changed |=
-            field(ui, "Kc", tr!("gain.kc"), &mut edited.gains.kc, format!(" {unit}/cm"), speed(gains.kc));
+        changed |= field(
+            ui,
+            "Kc",
+            tr!("gain.kc"),
+            &mut edited.gains.kc,
+            format!(" {}", text::quotient(unit, "cm")),
+            speed(gains.kc),
+        );
         changed |=
             field(ui, "Ti", tr!("gain.ti"), &mut edited.gains.ti_s, " s".to_owned(), speed(gains.ti_s));
         ui.end_row();

@@ -15,7 +15,7 @@ use crate::action::Action;
 use crate::panes::View;
 use crate::traces::RunTrace;
 use crate::workbench::{Outcome, column_choice};
-use crate::{i18n, text, theme, tr};
+use crate::{i18n, plots, text, theme, tr};
 
 /// State of the pane.
 pub struct State {
@@ -64,7 +64,7 @@ impl FitData {
 ///
 /// # Errors
 /// In words, when there is nothing to fit.
-pub fn data(document: &Document, run: &RunTrace, state: &State) -> Result<FitData, String> {
+pub fn data(document: &Document, run: &RunTrace, state: &State, focus: usize) -> Result<FitData, String> {
     let whole = Stretch { from_s: f64::NEG_INFINITY, to_s: f64::INFINITY };
     let stretch = document.stretch.unwrap_or(whole);
     match (document.source, &document.log) {
@@ -94,15 +94,15 @@ pub fn data(document: &Document, run: &RunTrace, state: &State) -> Result<FitDat
                 mv_unit: mv.unit.clone().unwrap_or_default(),
             })
         }
-        _ => of_run(document, run, stretch),
+        _ => of_run(document, run, stretch, focus),
     }
 }
 
-fn of_run(document: &Document, run: &RunTrace, stretch: Stretch) -> Result<FitData, String> {
-    let columns = (run.column(ChannelKind::Pv(0)), run.column(ChannelKind::Mv(0)));
+fn of_run(document: &Document, run: &RunTrace, stretch: Stretch, focus: usize) -> Result<FitData, String> {
+    let columns = (run.column(ChannelKind::Pv(focus)), run.column(ChannelKind::Mv(focus)));
     let (Some(pv), Some(mv)) = columns else { return Err(tr!("identify.no_data")) };
     let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s);
-    let active = document.rig.active_loops().first();
+    let active = document.rig.active_loops().get(focus);
     let spec = &document.rig.network.spec;
     let unit =
         active.and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump)).map_or("", |p| p.unit.symbol());
@@ -216,8 +216,7 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
 }
 
 fn gain_unit(entry: &ModelEntry) -> String {
-    let known = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
-    format!("[{}/{}]", known(&entry.pv_unit), known(&entry.mv_unit))
+    format!("[{}]", text::quotient(&entry.pv_unit, &entry.mv_unit))
 }
 
 fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Action>) {
@@ -260,8 +259,11 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
 }
 
 fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<Action>) {
-    let loop_unit =
-        view.snapshot.loops.first().map_or("", |l| view.snapshot.network.spec.pumps[l.pump].unit.symbol());
+    let loop_unit = view
+        .snapshot
+        .loops
+        .get(view.focus)
+        .map_or("", |l| view.snapshot.network.spec.pumps[l.pump].unit.symbol());
     ui.horizontal_wrapped(|ui| {
         let [k, t, l] = &mut state.typed;
         for (name, value, suffix) in
@@ -293,8 +295,10 @@ fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut V
 fn verdict(ui: &mut egui::Ui, entry: &ModelEntry) {
     let p = theme::palette(ui);
     if let ProcessModel::Fopdt(model) = &entry.model {
-        ui.label(RichText::new(format!("FOPDT · θ/τ = {}", text::brief(model.dead_time_ratio()))).color(p.weak))
-            .on_hover_text(tr!("identify.ratio_hint"));
+        ui.label(
+            RichText::new(format!("FOPDT · θ/τ = {}", text::brief(model.dead_time_ratio()))).color(p.weak),
+        )
+        .on_hover_text(tr!("identify.ratio_hint"));
     }
     let Some(fit) = &entry.fit else { return };
     for verdict in &fit.verdicts {
@@ -327,11 +331,11 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
     });
     Plot::new("overlay")
         .height(ui.available_height().clamp(110.0, 420.0))
-        .y_axis_min_width(40.0)
         .allow_scroll(false)
-        .y_axis_label(format!("PV{unit}"))
-        .x_axis_label(tr!("trend.time_axis"))
-        .x_axis_formatter(|mark, _| text::clock(mark.value))
+        .custom_y_axes(vec![plots::y_axis(format!("PV{unit}"))])
+        .custom_x_axes(vec![
+            plots::x_axis(tr!("trend.time_axis")).formatter(|mark, _| text::clock(mark.value)),
+        ])
         .grid_color(p.grid)
         .show(ui, |plot| {
             plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
@@ -344,8 +348,9 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
 fn fitted_data(view: &View, entry: &ModelEntry) -> Option<(Vec<f64>, Vec<f64>)> {
     match &entry.origin {
         ModelOrigin::Typed => None,
-        ModelOrigin::Run { stretch, .. } => {
-            let (pv, mv) = (view.run.column(ChannelKind::Pv(0))?, view.run.column(ChannelKind::Mv(0))?);
+        ModelOrigin::Run { tag, stretch } => {
+            let slot = view.document.rig.active_loops().iter().position(|l| l.id == *tag)?;
+            let (pv, mv) = (view.run.column(ChannelKind::Pv(slot))?, view.run.column(ChannelKind::Mv(slot))?);
             let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s) + 1;
             let whole =
                 range.filter(|&i| i < pv.len() && pv.values()[i].is_finite() && mv.values()[i].is_finite());

@@ -85,6 +85,8 @@ pub struct View<'a> {
     pub log: Option<&'a LogTrace>,
     /// Rules on the model in use.
     pub tuning: &'a TuningTable,
+    /// Which of the loops identification and tuning are about.
+    pub focus: usize,
     /// A fit is under way.
     pub fitting: bool,
     /// What happened, newest last.

@@ -10,7 +10,7 @@ use crate::action::Action;
 use crate::panes::View;
 use crate::panes::tune::row_in_view;
 use crate::tuning::{PRESENT, Row};
-use crate::{text, theme, tr};
+use crate::{plots, text, theme, tr};
 
 /// Points of the curve further away than this are left out: integral action runs to infinity.
 const FARTHEST: f64 = 60.0;
@@ -64,8 +64,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         .default_x_bounds(-2.4, 0.8)
         .default_y_bounds(-2.2, 1.0)
         .auto_bounds([false, false])
-        .x_axis_label("Re L(jω)")
-        .y_axis_label("Im L(jω)")
+        .custom_x_axes(vec![plots::x_axis("Re L(jω)")])
+        .custom_y_axes(vec![plots::y_axis("Im L(jω)")])
         .grid_color(p.grid)
         .label_formatter(move |position| {
             let at = match position {
@@ -155,6 +155,6 @@ fn circles(plot: &mut egui_plot::PlotUi<'_>, row: &Row, p: &theme::Palette) {
             plot.line(Line::new(name, line).stroke(edge).style(LineStyle::dashed_dense()));
         }
         let label = RichText::new(format!("Mt {}", text::brief(mt))).color(p.sp).size(theme::SMALL);
-        plot.text(Text::new("", PlotPoint::new(-0.5, -1.9), label).anchor(egui::Align2::LEFT_CENTER));
+        plot.text(Text::new("", PlotPoint::new(-0.47, -1.35), label).anchor(egui::Align2::LEFT_CENTER));
     }
 }

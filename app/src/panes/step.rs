@@ -11,7 +11,7 @@ use crate::panes::View;
 use crate::panes::tune::row_in_view;
 use crate::tuning::{PRESENT, Row};
 use crate::widgets::segmented;
-use crate::{text, theme, tr};
+use crate::{plots, text, theme, tr};
 
 /// State of the pane.
 #[derive(Default)]
@@ -110,14 +110,12 @@ fn curves(
     let mut plot = Plot::new(if is_pv { "step_y" } else { "step_u" })
         .height(height.max(50.0))
         .allow_scroll(false)
-        .y_axis_label(format!("{}{unit}", if is_pv { "PV" } else { "MV" }))
-        .y_axis_min_width(38.0)
+        .custom_y_axes(vec![plots::y_axis(format!("{}{unit}", if is_pv { "PV" } else { "MV" }))])
         .grid_color(p.grid)
         .grid_spacing(egui::Rangef::new(16.0, 160.0))
         .include_y(0.0);
-    if !is_pv {
-        plot = plot.x_axis_label(tr!("step.time_axis"));
-    }
+    let time_label = if is_pv { String::new() } else { tr!("step.time_axis") };
+    plot = plot.custom_x_axes(vec![plots::x_axis(time_label)]);
     let names = (tr!("step.in_view"), tr!("rules.present"));
     plot.show(ui, |plot| {
         if let Some(ghost) = ghost {

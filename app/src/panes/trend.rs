@@ -9,7 +9,7 @@ use vasos_engine::signal::{ChannelKind, Pyramid};
 use crate::action::Action;
 use crate::panes::View;
 use crate::theme::{self, Palette};
-use crate::{text, tr};
+use crate::{plots, text, tr};
 
 /// Stretches of time to choose from, in seconds; the last is everything.
 const SPANS_S: [Option<f64>; 5] = [Some(60.0), Some(300.0), Some(600.0), Some(1800.0), None];
@@ -95,7 +95,8 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
             let label =
                 |span: Option<f64>| span.map_or_else(|| tr!("trend.all"), |s| format!("{} min", s / 60.0));
             let before = state.span;
-            let combo = egui::ComboBox::from_id_salt("span").width(70.0).selected_text(label(SPANS_S[state.span]));
+            let combo =
+                egui::ComboBox::from_id_salt("span").width(70.0).selected_text(label(SPANS_S[state.span]));
             let combo = combo.show_ui(ui, |ui| {
                 for (i, span) in SPANS_S.into_iter().enumerate() {
                     ui.selectable_value(&mut state.span, i, label(span));
@@ -257,6 +258,7 @@ fn plot(
     let curves = if is_upper { &content.upper } else { &content.lower };
     let axis = if is_upper { &content.upper_axis } else { &content.lower_axis };
     let names: Vec<String> = curves.iter().map(|c| c.name.clone()).collect();
+    let time_label = if is_upper { String::new() } else { tr!("trend.time_axis") };
     let time_axis = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| axis_time(mark);
     let plot = Plot::new(if is_upper { "upper" } else { "lower" })
         .height(height)
@@ -267,9 +269,8 @@ fn plot(
         .allow_boxed_zoom(false)
         .allow_double_click_reset(false)
         .link_cursor(Id::unique("trend"), [true, false])
-        .y_axis_label(axis.clone())
-        .y_axis_min_width(52.0)
-        .x_axis_formatter(time_axis)
+        .custom_y_axes(vec![plots::y_axis(axis.clone())])
+        .custom_x_axes(vec![plots::x_axis(time_label).formatter(time_axis)])
         .show_axes([true, true])
         .grid_color(p.grid)
         .set_margin_fraction(vec2(0.0, 0.12))
@@ -286,7 +287,6 @@ fn plot(
                 egui_plot::HoverPosition::Elsewhere { position } => Some(at(position)),
             }
         });
-    let plot = if is_upper { plot.x_axis_label("") } else { plot.x_axis_label(tr!("trend.time_axis")) };
     let bounds = state.bounds_s;
     let (brushing, follow) = (state.brushing, state.follow);
     let pixels = ui.available_width().max(100.0) as usize;

@@ -62,10 +62,10 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             state.form = if form == 1 { Form::Parallel } else { Form::Ideal };
         }
     });
-    let below = 78.0;
+    let below = 64.0;
     let height = (ui.available_height() - below).max(60.0);
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
-        ui.set_min_width(100.0 + 9.0 * (COLUMN + 3.0) + 14.0);
+        ui.set_min_width(88.0 + 9.0 * (COLUMN + 3.0) + 14.0);
         ui.spacing_mut().item_spacing = egui::vec2(3.0, 0.0);
         table(ui, view, state, height, &mut actions);
     });
@@ -90,20 +90,17 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let chosen = row_in_view(view).map(|r| (r.rule, r.kind));
     let rows: Vec<&Row> = view.tuning.rows.iter().filter(|r| shown(state, r)).collect();
     let entry = view.document.model();
-    let unit = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
-    let (pv, mv) =
-        entry.map_or(("–".to_owned(), "–".to_owned()), |e| (unit(&e.pv_unit), unit(&e.mv_unit)));
+    let (pv, mv) = entry.map_or(("", ""), |e| (e.pv_unit.as_str(), e.mv_unit.as_str()));
+    let (gain, inverse) = (text::quotient(mv, pv), text::quotient(pv, mv));
     let gains = match state.form {
-        Form::Ideal => [format!("Kc\n{mv}/{pv}"), "Ti\ns".to_owned(), "Td\ns".to_owned()],
-        Form::Parallel => {
-            [format!("Kp\n{mv}/{pv}"), format!("Ki\n{mv}/({pv}·s)"), format!("Kd\n{mv}·s/{pv}")]
-        }
+        Form::Ideal => [format!("Kc\n{gain}"), "Ti\ns".to_owned(), "Td\ns".to_owned()],
+        Form::Parallel => [format!("Kp\n{gain}"), format!("Ki\n{gain}/s"), format!("Kd\n{gain}·s")],
     };
     let rest = [
         ("Ms".to_owned(), tr!("tune.ms_hint")),
         ("Mt".to_owned(), tr!("tune.mt_hint")),
-        (format!("Jv\n{pv}·s/{mv}"), tr!("tune.jv_hint")),
-        (format!("Ju\n{mv}/{pv}"), tr!("tune.ju_hint")),
+        (format!("Jv\n{inverse}·s"), tr!("tune.jv_hint")),
+        (format!("Ju\n{gain}"), tr!("tune.ju_hint")),
         (tr!("tune.iae_header"), tr!("tune.iae_hint")),
         (tr!("tune.overshoot_header"), tr!("tune.overshoot_hint")),
     ];
@@ -111,7 +108,7 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
         .striped(true)
         .sense(egui::Sense::click())
         .cell_layout(egui::Layout::left_to_right(egui::Align::Center))
-        .column(Column::remainder().at_least(100.0).clip(true))
+        .column(Column::remainder().at_least(88.0).clip(true))
         .columns(Column::exact(COLUMN), 8)
         .column(Column::exact(COLUMN + 6.0))
         .min_scrolled_height(40.0)
@@ -159,7 +156,8 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink
         let sign = if flagged { "! " } else { "" };
         let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
         let words = format!("{sign}{title} · {}", row.kind);
-        ui.add(egui::Label::new(RichText::new(&words).size(theme::TABLE).color(ink)).truncate()).on_hover_text(words);
+        ui.add(egui::Label::new(RichText::new(&words).size(theme::TABLE).color(ink)).truncate())
+            .on_hover_text(words);
     });
     let g = &row.gains;
     let none = |v: f64| if v == 0.0 || v.is_infinite() { "–".to_owned() } else { text::brief(v) };
@@ -199,8 +197,8 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let line = ui.add(egui::Label::new(RichText::new(&source).size(theme::SMALL).color(colour)).truncate());
     line.on_hover_text(format!("{source}\n{}", row.source));
     ui.horizontal_wrapped(|ui| {
-        let tag = view.snapshot.loops.first().map(|l| l.tag.clone());
-        let able = tag.is_some() && row.rule != PRESENT && row.gains.ti_s.is_finite() && matches_loop(view);
+        let tag = view.snapshot.loops.get(view.focus).map(|l| l.tag.clone());
+        let able = tag.is_some() && row.rule != PRESENT && row.gains.ti_s.is_finite();
         let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| tr!("tune.apply_to", tag = t));
         let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
         let hint =
@@ -233,12 +231,6 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
             }
         }
     });
-}
-
-/// Whether the model's units are those of the loop; a model of another plant is for looking, unless its log gave
-/// no units.
-fn matches_loop(view: &View) -> bool {
-    view.document.model().is_some()
 }
 
 fn apply(view: &View, row: &Row, tag: String) -> Action {

@@ -149,7 +149,8 @@ impl Workbench {
             return;
         }
         self.notice = None;
-        match identify::data(self.history.document(), &self.run, &self.states.identify) {
+        let focus = self.states.faceplate.shown;
+        match identify::data(self.history.document(), &self.run, &self.states.identify, focus) {
             Ok(data) => self.jobs.start("fit", move || data.fit()),
             Err(words) => self.refuse(words),
         }

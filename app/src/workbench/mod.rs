@@ -162,7 +162,7 @@ impl Workbench {
             journal::add(&mut self.journal, journal::of_event(&event));
         }
         self.take_results(ctx);
-        self.tuning.update(self.history.document());
+        self.tuning.update(self.history.document(), self.states.faceplate.shown);
         if let Some(recording) = &mut self.recording {
             for trouble in recording.troubles() {
                 let words = i18n::say(&trouble);
@@ -187,6 +187,7 @@ impl Workbench {
             kept: self.kept.as_ref(),
             log: self.log.as_ref(),
             tuning: &self.tuning,
+            focus: self.states.faceplate.shown,
             fitting: self.jobs.is_busy(),
             journal: &self.journal,
         };

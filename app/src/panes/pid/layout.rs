@@ -31,6 +31,8 @@ pub struct ValvePlace {
     pub at: Pos2,
     /// The pipe runs down the drawing.
     pub vertical: bool,
+    /// An instrument stands above: the label goes below.
+    pub label_below: bool,
 }
 
 /// The whole drawing, in grid units.
@@ -76,7 +78,8 @@ impl Layout {
         let top = all.top() - HEAD_ROOM;
         let middle = all.center().x;
         let spill_side = tanks.iter().map(|t| if t.center().x > middle { 1.0 } else { -1.0 }).collect();
-        let (valves, valve_routes) = network.valves.iter().map(|v| valve(v, &tanks)).unzip();
+        let (mut valves, valve_routes): (Vec<ValvePlace>, Vec<Route>) =
+            network.valves.iter().map(|v| valve(v, &tanks)).unzip();
         let (mut pumps, mut suctions, mut discharges) = (vec![], vec![], vec![]);
         for pump in &network.pumps {
             let (at, suction, discharge) = pump_route(pump, &tanks, all, top);
@@ -103,8 +106,15 @@ impl Layout {
         for point in pumps.iter().chain(&sensors) {
             bounds.extend_with(*point + vec2(0.28, 0.2));
         }
+        for place in valves.iter_mut().filter(|v| !v.vertical) {
+            let above = |s: &Pos2| (s.x - place.at.x).abs() < 0.5 && (0.0..0.5).contains(&(place.at.y - s.y));
+            place.label_below = sensors.iter().any(above);
+        }
+        if network.pumps.iter().any(|p| p.from.is_none()) {
+            // Room for the tags above the pumps.
+            bounds.extend_with(pos2(all.left() - 0.4, top - 0.3));
+        }
         for route in &valve_routes {
-            let route: &Route = route;
             for point in &route.pipe {
                 bounds.extend_with(*point);
             }
@@ -131,7 +141,10 @@ fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Rou
         let end = pos2(from.center().x, from.bottom() + 0.5);
         let pipe = vec![from.center_bottom(), end];
         let at = from.center_bottom() + vec2(0.0, 0.2);
-        return (ValvePlace { at, vertical: true }, Route { pipe, falls_into: None, to_outside: true });
+        return (
+            ValvePlace { at, vertical: true, label_below: false },
+            Route { pipe, falls_into: None, to_outside: true },
+        );
     };
     let target = tanks[to];
     if valve.drive == ValveDrive::Between {
@@ -143,7 +156,7 @@ fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Rou
         };
         let at = start + (end - start) * 0.5;
         return (
-            ValvePlace { at, vertical: false },
+            ValvePlace { at, vertical: false, label_below: false },
             Route { pipe: vec![start, end], falls_into: None, to_outside: false },
         );
     }
@@ -159,7 +172,10 @@ fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Rou
     let end_x = if inside { start.x } else { target.center().x };
     pipe.push(pos2(end_x, target.top() - 0.06));
     let at = start + vec2(0.0, 0.44 * gap);
-    (ValvePlace { at, vertical: true }, Route { pipe, falls_into: Some(to), to_outside: false })
+    (
+        ValvePlace { at, vertical: true, label_below: false },
+        Route { pipe, falls_into: Some(to), to_outside: false },
+    )
 }
 
 fn pump_route(

@@ -113,7 +113,8 @@ fn valve_ui(
     }
     if response.has_focus() {
         // The arrows turn the valve instead of leaving it.
-        let filter = egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
+        let filter =
+            egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
         ui.memory_mut(|m| m.set_focus_lock_filter(response.id, filter));
         let steps = ui.input(|i| {
             let pressed = |k| i.num_presses(k) as f64;

@@ -67,6 +67,8 @@ pub struct ValveView {
     pub at: Pos2,
     /// On a pipe that runs down.
     pub vertical: bool,
+    /// Its label stands below.
+    pub label_below: bool,
     /// Angle in degrees.
     pub angle_deg: f64,
     /// Its stream.
@@ -148,6 +150,7 @@ impl PidModel {
                 tag: spec.valves[i].id.clone(),
                 at: frame.point(layout.valves[i].at),
                 vertical: layout.valves[i].vertical,
+                label_below: layout.valves[i].label_below,
                 angle_deg: snapshot.valves[i].angle_deg,
                 stream: stream(&layout.valve_routes[i], snapshot.valves[i].flow_cm3_s),
             })

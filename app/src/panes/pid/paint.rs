@@ -183,9 +183,9 @@ fn bubble(painter: &Painter, view: &BubbleView, radius: f32, p: &Palette) {
     }
     if let Some(automatic) = view.automatic {
         let words = if automatic { tr!("mode.auto") } else { tr!("mode.manual") };
-        let at = view.at + vec2(0.0, radius + 2.0);
+        let at = view.at + vec2(5.0, radius + 2.0);
         let colour = if automatic { p.weak } else { p.caution };
-        painter.text(at, Align2::CENTER_TOP, words, theme::bold_font(10.5), colour);
+        painter.text(at, Align2::LEFT_TOP, words, theme::bold_font(10.5), colour);
     }
     if view.abnormal {
         badge(painter, view.at - vec2(0.0, radius + 9.0), &tr!("pid.out_of_range"), p);
@@ -226,6 +226,9 @@ pub fn valve_label(painter: &Painter, view: &ValveView, scale: f32, p: &Palette)
     let (a, b) = if view.vertical {
         let left = view.at + vec2(r + 8.0, 0.0);
         (left - vec2(0.0, name.size().y), left)
+    } else if view.label_below {
+        let top = view.at + vec2(-0.5 * name.size().x.max(flow.size().x), r + 4.0);
+        (top, top + vec2(0.0, name.size().y))
     } else {
         let bottom = view.at - vec2(0.0, r + 6.0);
         let width = name.size().x.max(flow.size().x);
