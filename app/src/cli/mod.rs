@@ -1,1 +1,198 @@
-//! Command line.
+//! The command line: the engine without a window. Nothing here needs a display.
+//!
+//! Exit status: 0 done, 1 the answer is no, 2 bad input with the reason on standard error. `--json` prints what the
+//! text says as JSON, non-finite and absent numbers as `null`; its keys are an interface.
+
+mod analyze;
+mod identify;
+mod json;
+pub mod parse;
+mod simulate;
+mod tune;
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+const AFTER: &str = "\
+Models:  K=4.9,T=152,L=2   Kv=0.03,L=2   K=1,T1=9,T2=3,L=1,Tz=-2   num=1 2,den=1 3 3 1,L=0
+Exit status: 0 done, 1 the answer is no, 2 bad input (the reason is on standard error).
+
+Examples:
+  vasos                                      open the workbench
+  vasos step.csv                             open it with a log
+  vasos simulate run.toml -o run.csv
+  vasos identify step.csv --pv h2 --mv u --json
+  vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
+  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152";
+
+/// Process control workbench: simulate, identify, tune, analyse.
+#[derive(Debug, Parser)]
+#[command(name = "vasos", version, args_conflicts_with_subcommands = true, after_help = AFTER)]
+pub struct Cli {
+    /// Project or log to open in the workbench; a file named like a command is written ./NAME.
+    pub file: Option<PathBuf>,
+    /// What to do without a window.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// Commands without a window.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a scenario on a simulated rig and write its signals.
+    Simulate(simulate::Arguments),
+    /// Fit a process model to a log.
+    Identify(identify::Arguments),
+    /// Tune a controller for a model by published rules.
+    Tune(tune::Arguments),
+    /// Judge a controller on a model: stability, margins, sensitivities, responses.
+    Analyze(analyze::Arguments),
+    /// Not available yet: identify, tune, compare and report in one go.
+    Retune(Later),
+    /// Not available yet: fit a rig to a recording.
+    FitPlant(Later),
+    /// Not available yet: serve a simulated rig to other programs.
+    Serve(Later),
+    /// Not available yet: record a live rig.
+    Record(Later),
+    /// Not available yet: replay a recording.
+    Replay(Later),
+    /// Not available yet: run a prepared experiment.
+    Experiment(Later),
+}
+
+/// Arguments of a command that is to come.
+#[derive(Debug, clap::Args)]
+#[command(disable_help_flag = true)]
+pub struct Later {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+    rest: Vec<OsString>,
+}
+
+/// What the command line asks for.
+#[derive(Debug, PartialEq, Eq)]
+pub enum CliOutcome {
+    /// Everything is done and said; end with this status.
+    Exit(u8),
+    /// Open the workbench, with a project or a log.
+    OpenWindow(Option<PathBuf>),
+}
+
+/// What a command answers.
+#[derive(Debug)]
+struct Answer {
+    /// For standard output.
+    text: String,
+    /// Remarks for standard error.
+    remarks: Vec<String>,
+    /// 0, or 1 for a no.
+    status: u8,
+}
+
+impl Answer {
+    fn done(text: String) -> Self {
+        Self { text, remarks: vec![], status: 0 }
+    }
+}
+
+/// Bad input, in words that say what to do.
+#[derive(Debug)]
+struct Refusal(String);
+
+impl Refusal {
+    fn of(error: impl std::fmt::Display) -> Self {
+        Self(error.to_string())
+    }
+
+    fn later(what: &str) -> Self {
+        Self(format!("{what} is not available yet"))
+    }
+}
+
+/// Reads the arguments, the program's name first, and does what they say.
+///
+/// Prints to standard output and standard error; opens no window.
+pub fn main_with(arguments: impl Iterator<Item = OsString>) -> CliOutcome {
+    match Cli::try_parse_from(arguments) {
+        Ok(cli) => run(cli),
+        Err(error) => {
+            // Help and version come this way as well, with status 0.
+            drop(error.print());
+            CliOutcome::Exit(u8::try_from(error.exit_code()).unwrap_or(2))
+        }
+    }
+}
+
+/// Does what the arguments say.
+#[must_use]
+pub fn run(cli: Cli) -> CliOutcome {
+    let Some(command) = cli.command else { return CliOutcome::OpenWindow(cli.file) };
+    let answered = match &command {
+        Command::Simulate(arguments) => simulate::run(arguments),
+        Command::Identify(arguments) => identify::run(arguments),
+        Command::Tune(arguments) => tune::run(arguments),
+        Command::Analyze(arguments) => analyze::run(arguments),
+        Command::Retune(_) => Err(Refusal::later("vasos retune")),
+        Command::FitPlant(_) => Err(Refusal::later("vasos fit-plant")),
+        Command::Serve(_) => Err(Refusal::later("vasos serve")),
+        Command::Record(_) => Err(Refusal::later("vasos record")),
+        Command::Replay(_) => Err(Refusal::later("vasos replay")),
+        Command::Experiment(_) => Err(Refusal::later("vasos experiment")),
+    };
+    CliOutcome::Exit(say(answered))
+}
+
+/// Prints an answer; a reader that closes its pipe early is no error.
+fn say(answered: Result<Answer, Refusal>) -> u8 {
+    match answered {
+        Ok(answer) => {
+            let mut out = std::io::stdout().lock();
+            drop(writeln!(out, "{}", answer.text.trim_end()).and_then(|()| out.flush()));
+            for remark in answer.remarks {
+                drop(writeln!(std::io::stderr(), "vasos: {remark}"));
+            }
+            answer.status
+        }
+        Err(Refusal(reason)) => {
+            drop(writeln!(std::io::stderr(), "vasos: {reason}"));
+            2
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(arguments: &[&str]) -> CliOutcome {
+        main_with(std::iter::once("vasos").chain(arguments.iter().copied()).map(OsString::from))
+    }
+
+    #[test]
+    fn the_definitions_are_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_bare_path_opens_the_window_and_a_command_does_not() {
+        assert_eq!(outcome(&[]), CliOutcome::OpenWindow(None));
+        for path in ["step.csv", "./tune", "/a b/c.vasos"] {
+            assert_eq!(outcome(&[path]), CliOutcome::OpenWindow(Some(path.into())));
+        }
+        assert_eq!(outcome(&["analyze", "--model", "K=1,T=2,L=1", "--gains", "Kc=1"]), CliOutcome::Exit(0));
+        assert_eq!(outcome(&["step.csv", "tune"]), CliOutcome::Exit(2));
+        assert_eq!(outcome(&["--wrong"]), CliOutcome::Exit(2));
+        assert_eq!(outcome(&["--help"]), CliOutcome::Exit(0));
+    }
+
+    #[test]
+    fn what_is_to_come_says_so() {
+        for command in ["retune", "fit-plant", "serve", "record", "replay", "experiment"] {
+            assert_eq!(outcome(&[command, "--list", "x"]), CliOutcome::Exit(2), "{command}");
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! `vasos analyze`: what a controller is worth on a model.
+
+use serde_json::{Map, Value, json};
+use vasos_engine::analyze::{analyze, step_figures};
+use vasos_engine::tune::ControllerKind;
+
+use super::json::{self, shown, table};
+use super::{Answer, Refusal, parse};
+
+/// Arguments of `vasos analyze`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=7,Ti=15,Td=1,N=10 --json"
+)]
+pub struct Arguments {
+    /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..
+    #[arg(long, allow_hyphen_values = true)]
+    model: String,
+    /// Gains of the ideal form: Kc=..[,Ti=..][,Td=..][,N=..]; without Ti no integral action, N is 10.
+    #[arg(long, allow_hyphen_values = true)]
+    gains: String,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
+    let model = parse::model(&arguments.model).map_err(Refusal::of)?;
+    let gains = parse::gains(&arguments.gains).map_err(Refusal::of)?;
+    let analysis = analyze(&model, &gains);
+    let figures = step_figures(&model, &gains, &analysis);
+    if arguments.json {
+        let mut result = Map::new();
+        json::add_gains(&mut result, ControllerKind::of(&gains), Some(&gains));
+        json::add_analysis(&mut result, &analysis);
+        json::add_figures(&mut result, &analysis, &figures);
+        json::add_remarks(&mut result, true, &[]);
+        let whole = json!({"model": json::model(&model), "result": Value::Object(result)});
+        return Ok(Answer::done(json::text(&whole)));
+    }
+    if !analysis.stable {
+        return Ok(Answer::done("The loop is unstable: nothing else can be said of it.".to_owned()));
+    }
+    let a = &analysis;
+    let rows = [
+        ("Ms", a.ms, ""),
+        ("Mt", a.mt, ""),
+        ("Ju", a.ju, "MV/PV"),
+        ("Jv", a.jv, "PV·s/MV"),
+        ("gain margin", a.gain_margin, ""),
+        ("phase margin", a.phase_margin_deg, "°"),
+        ("delay margin", a.delay_margin_s, "s"),
+        ("crossover", a.w_gc_rad_s, "rad/s"),
+        ("phase crossover", a.w_180_rad_s, "rad/s"),
+        ("IAE of a load step", figures.iae_load, "PV·s/MV"),
+        ("IAE of a setpoint step", figures.iae_setpoint, "s"),
+        ("overshoot", figures.overshoot_percent, "%"),
+    ];
+    let rows: Vec<Vec<String>> = std::iter::once(vec!["stable".to_owned(), "yes".to_owned()])
+        .chain(rows.map(|(name, value, unit)| {
+            vec![if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }, shown(value)]
+        }))
+        .collect();
+    Ok(Answer::done(table(&rows)))
+}

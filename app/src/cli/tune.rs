@@ -1,0 +1,168 @@
+//! `vasos tune`: gains from published rules, each with what it is worth.
+
+use serde_json::{Map, Value, json};
+use vasos_engine::analyze::{Analysis, analyze};
+use vasos_engine::model::ProcessModel;
+use vasos_engine::tune::{
+    ControllerKind, Rule, RuleError, RuleOptions, Tuning, find_rule, registry, tune_all,
+};
+
+use super::json::{self, shown, table};
+use super::{Answer, Refusal, parse};
+
+/// Arguments of `vasos tune`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pid --json
+  vasos tune --model Kv=0.03,L=2 --rule all
+A rule without --controller gives the richest one it has; --rule all then gives every one.
+Exit status 1: the rule has no answer for this model.")]
+pub struct Arguments {
+    /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..
+    #[arg(long, allow_hyphen_values = true)]
+    model: String,
+    /// Name of a rule, or all.
+    #[arg(long, required_unless_present = "optimal", conflicts_with = "optimal")]
+    rule: Option<String>,
+    /// Not available yet: the best gains under limits of robustness.
+    #[arg(long)]
+    optimal: bool,
+    /// p, pi, pd or pid.
+    #[arg(long)]
+    controller: Option<String>,
+    /// Closed-loop time constant (τc or λ) in seconds, for the rules that have one.
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    tau_c: Option<f64>,
+    /// Ku=..,Pu=.. from a test, for the rules that start from them.
+    #[arg(long, value_name = "Ku=..,Pu=..", allow_hyphen_values = true)]
+    ultimate: Option<String>,
+    /// Not available yet: limits and objective of the optimum.
+    #[arg(long, hide = true, value_name = "X", requires = "optimal")]
+    objective: Option<String>,
+    #[arg(long, hide = true, requires = "optimal")]
+    ms: Option<f64>,
+    #[arg(long, hide = true, requires = "optimal")]
+    mt: Option<f64>,
+    #[arg(long, hide = true, requires = "optimal")]
+    ju: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A rule applied, and its loop analysed.
+struct Applied {
+    rule: &'static Rule,
+    kind: ControllerKind,
+    outcome: Result<(Tuning, Analysis), RuleError>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
+    if arguments.optimal {
+        return Err(Refusal::later("vasos tune --optimal"));
+    }
+    let model = parse::model(&arguments.model).map_err(Refusal::of)?;
+    let ultimate = arguments.ultimate.as_deref().map(parse::ultimate).transpose().map_err(Refusal::of)?;
+    let options = RuleOptions { tau_c_s: arguments.tau_c, ultimate, ..RuleOptions::default() };
+    let kind = arguments.controller.as_deref().map(controller).transpose()?;
+    let name = arguments.rule.as_deref().unwrap_or_default();
+    let worth = |tuning: Tuning| {
+        let analysis = analyze(&model, &tuning.gains);
+        (tuning, analysis)
+    };
+    let applied: Vec<Applied> = if name == "all" {
+        let wanted = |k: ControllerKind| kind.is_none_or(|wanted| wanted == k);
+        let all = tune_all(&model, &options).into_iter().filter(|(_, k, _)| wanted(*k));
+        all.map(|(rule, kind, tuned)| Applied { rule, kind, outcome: tuned.map(worth) }).collect()
+    } else {
+        let rule = find_rule(name, kind.unwrap_or(ControllerKind::Pid)).ok_or_else(|| unknown_rule(name))?;
+        let richest = || rule.controllers.iter().copied().max_by_key(|k| k.id().len());
+        let kind = kind.or_else(richest).unwrap_or(ControllerKind::Pi);
+        let outcome = rule.tune(&model, kind, &options).map(worth);
+        vec![Applied { rule, kind, outcome }]
+    };
+    answer(arguments.json, &model, &applied)
+}
+
+fn controller(name: &str) -> Result<ControllerKind, Refusal> {
+    ControllerKind::from_id(name)
+        .ok_or_else(|| Refusal(format!("there is no controller '{name}': choose p, pi, pd or pid")))
+}
+
+fn unknown_rule(name: &str) -> Refusal {
+    let known: Vec<&str> = registry().iter().map(|rule| rule.id).collect();
+    Refusal(format!("there is no rule '{name}': choose all, or one of {}", known.join(", ")))
+}
+
+fn answer(as_json: bool, model: &ProcessModel, applied: &[Applied]) -> Result<Answer, Refusal> {
+    let mut status = 0;
+    let mut remarks = Vec::new();
+    if applied.iter().all(|a| a.outcome.is_err()) {
+        // Wrong numbers are bad input; a rule that has no answer is an answer.
+        for failed in applied.iter().filter_map(|a| a.outcome.as_ref().err()) {
+            if matches!(failed, RuleError::TauC { .. } | RuleError::Ultimate { .. }) {
+                return Err(Refusal::of(failed));
+            }
+        }
+        status = 1;
+        remarks = applied.iter().filter_map(|a| a.outcome.as_ref().err()).map(ToString::to_string).collect();
+        remarks.dedup();
+    }
+    let text = if as_json {
+        let results: Vec<Value> = applied.iter().map(result).collect();
+        json::text(&json!({"model": json::model(model), "results": results}))
+    } else {
+        as_table(applied)
+    };
+    Ok(Answer { text, remarks, status })
+}
+
+fn result(applied: &Applied) -> Value {
+    let mut to = Map::new();
+    to.insert("rule".into(), json!(applied.rule.id));
+    match &applied.outcome {
+        Ok((tuning, analysis)) => {
+            let warnings: Vec<String> = tuning.warnings.iter().map(ToString::to_string).collect();
+            json::add_gains(&mut to, applied.kind, Some(&tuning.gains));
+            json::add_analysis(&mut to, analysis);
+            json::add_remarks(&mut to, tuning.valid(), &warnings);
+        }
+        Err(error) => {
+            json::add_gains(&mut to, applied.kind, None);
+            json::add_analysis(&mut to, &Analysis::default());
+            json::add_remarks(&mut to, false, &[error.to_string()]);
+        }
+    }
+    Value::Object(to)
+}
+
+fn as_table(applied: &[Applied]) -> String {
+    let head = ["rule", "controller", "Kc", "Ti (s)", "Td (s)", "Ms", "Mt", "Ju", "Jv", "GM", "PM (°)"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut notes = String::new();
+    for one in applied {
+        let name = format!("{} {}", one.rule.id, one.kind);
+        match &one.outcome {
+            Ok((tuning, a)) => {
+                let g = &tuning.gains;
+                let mut row = vec![one.rule.id.to_owned(), one.kind.to_string()];
+                row.extend([g.kc, g.ti_s, g.td_s].map(|v| shown(Some(v))));
+                row.extend([a.ms, a.mt, a.ju, a.jv, a.gain_margin, a.phase_margin_deg].map(shown));
+                rows.push(row);
+                if !a.stable {
+                    notes.push_str(&format!("{name}: the loop is unstable\n"));
+                }
+                for warning in &tuning.warnings {
+                    notes.push_str(&format!("{name}: {warning}\n"));
+                }
+            }
+            Err(error) if applied.len() > 1 => notes.push_str(&format!("{name}: {error}\n")),
+            Err(_) => {}
+        }
+    }
+    if rows.len() == 1 {
+        return notes;
+    }
+    format!("{}\n{notes}", table(&rows))
+}
