@@ -127,7 +127,7 @@ pub const DARK: Palette = Palette {
     grid: Color32::from_rgb(0x3a, 0x40, 0x44),
     ghost: Color32::from_rgb(0x9a, 0x9f, 0xa3),
     shade: Color32::from_rgba_premultiplied(0x1b, 0x2e, 0x40, 0x60),
-    row: Color32::from_rgb(0x2f, 0x44, 0x58),
+    row: Color32::from_rgb(0x2c, 0x3f, 0x52),
 };
 
 /// Light.

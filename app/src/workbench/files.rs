@@ -55,7 +55,7 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
     };
     let name = path.file_name().map_or(shown, |n| n.to_string_lossy().into_owned());
     match import_log(&name, &bytes, options) {
-        Ok(log) => Outcome::Log(path.to_owned(), log),
+        Ok(log) => Outcome::Log(path.to_owned(), Box::new(log)),
         Err(error) => Outcome::Failed(Box::new(error)),
     }
 }
@@ -77,7 +77,7 @@ impl Workbench {
                 Outcome::Log(path, log) => {
                     let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
                     self.tell(Weight::Note, words);
-                    self.import = Some(ImportSheet::new(path, log));
+                    self.import = Some(ImportSheet::new(path, *log));
                 }
                 Outcome::Rig(path, network) => {
                     self.settings.remember(path);

@@ -20,7 +20,7 @@ pub type Said = Box<dyn Explain + Send>;
 /// What a job came to.
 pub enum Outcome {
     /// A log was read.
-    Log(PathBuf, ImportedLog),
+    Log(PathBuf, Box<ImportedLog>),
     /// A rig was read.
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.
