@@ -274,17 +274,17 @@ fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut V
                 .labelled_by(name.id);
         }
         let model = Fopdt::new(state.typed[0], state.typed[1], state.typed[2]);
-        if ui.add_enabled(model.is_ok(), egui::Button::new(tr!("identify.add"))).clicked() {
-            if let Ok(model) = model {
-                actions.push(Action::Document(DocumentCommand::AddModel(Box::new(NewModel {
-                    model: ProcessModel::Fopdt(model),
-                    origin: ModelOrigin::Typed,
-                    fit: None,
-                    pv_unit: "cm".to_owned(),
-                    mv_unit: loop_unit.to_owned(),
-                }))));
-                state.typing = false;
-            }
+        if ui.add_enabled(model.is_ok(), egui::Button::new(tr!("identify.add"))).clicked()
+            && let Ok(model) = model
+        {
+            actions.push(Action::Document(DocumentCommand::AddModel(Box::new(NewModel {
+                model: ProcessModel::Fopdt(model),
+                origin: ModelOrigin::Typed,
+                fit: None,
+                pv_unit: "cm".to_owned(),
+                mv_unit: loop_unit.to_owned(),
+            }))));
+            state.typing = false;
         }
         if let Err(error) = model {
             ui.label(RichText::new(format!("! {}", i18n::say(&error))).color(theme::palette(ui).caution));

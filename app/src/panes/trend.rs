@@ -2,13 +2,16 @@
 //! stretch for identification.
 
 use eframe::egui::{self, Color32, Id, Role, WidgetInfo, vec2};
-use egui_plot::{GridMark, HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine};
+use egui_plot::{
+    Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine,
+};
 use vasos_engine::document::{DocumentCommand, SourceChoice, Stretch};
 use vasos_engine::signal::{ChannelKind, Pyramid};
 
 use crate::action::Action;
 use crate::panes::View;
 use crate::theme::{self, Palette};
+use crate::traces::RunTrace;
 use crate::{plots, text, tr};
 
 /// Stretches of time to choose from, in seconds; the last is everything.
@@ -126,87 +129,59 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
 }
 
 fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
-    let (mut upper, mut lower) = (vec![], vec![]);
-    let mut units = vec![];
+    let mut content = Content {
+        upper: vec![],
+        lower: vec![],
+        upper_axis: tr!("trend.level_axis"),
+        lower_axis: "MV".to_owned(),
+        end_s: view.run.end_s(),
+    };
     let spec = &view.snapshot.network.spec;
     if state.tanks {
         for (i, tank) in spec.tanks.iter().enumerate() {
-            if let Some(data) = view.run.column(ChannelKind::Level(i)) {
-                let colour = theme::series(p, i + 3);
-                upper.push(Curve {
-                    name: format!("{} [cm]", tank.id),
-                    data,
-                    colour,
-                    steps: false,
-                    thin: true,
-                });
-            }
+            let look = Look { colour: theme::series(p, i + 3), steps: false, thin: true };
+            let name = format!("{} [cm]", tank.id);
+            content.upper.extend(curve(view.run, ChannelKind::Level(i), name, look));
         }
     }
     for (slot, now) in view.snapshot.loops.iter().enumerate() {
         let unit = spec.pumps[now.pump].unit.symbol();
-        units.push(unit);
-        let shade = |c: Color32| if slot == 0 { c } else { c.gamma_multiply(0.55 + 0.1 * slot as f32) };
-        let push = |to: &mut Vec<Curve<'a>>,
-                    run: &'a crate::traces::RunTrace,
-                    kind,
-                    name: String,
-                    colour,
-                    steps,
-                    thin| {
-            if let Some(data) = run.column(kind) {
-                to.push(Curve { name, data, colour, steps, thin });
-            }
-        };
-        if let Some(kept) = view.kept {
-            let name = |what: &str| format!("{what}, {}", tr!("trend.kept"));
-            push(&mut upper, kept, ChannelKind::Pv(slot), name("PV [cm]"), p.ghost, false, true);
-            push(
-                &mut lower,
-                kept,
-                ChannelKind::Mv(slot),
-                format!("{} ", name(&format!("MV [{unit}]"))),
-                p.ghost,
-                true,
-                true,
-            );
+        if slot == view.focus {
+            content.lower_axis = format!("MV [{unit}]");
         }
-        let sensor = &spec.sensors[now.sensor].id;
-        push(
-            &mut upper,
-            view.run,
-            ChannelKind::Setpoint(slot),
-            format!("SP {} [cm]", now.tag),
-            shade(p.sp),
-            true,
-            false,
-        );
-        push(
-            &mut upper,
-            view.run,
-            ChannelKind::Pv(slot),
-            format!("PV {sensor} [cm]"),
-            shade(p.pv),
-            false,
-            false,
-        );
-        push(
-            &mut lower,
-            view.run,
-            ChannelKind::Mv(slot),
-            format!("MV {} [{unit}]", spec.pumps[now.pump].id),
-            shade(p.mv),
-            true,
-            false,
-        );
+        // The loop in view stands out from the others.
+        let other = slot != view.focus;
+        let look = |colour: Color32, steps| Look {
+            colour: if other { colour.gamma_multiply(0.6) } else { colour },
+            steps,
+            thin: other,
+        };
+        let pv = format!("PV {} [cm]", spec.sensors[now.sensor].id);
+        let mv = format!("MV {} [{unit}]", spec.pumps[now.pump].id);
+        if let Some(kept) = view.kept {
+            let look = |steps| Look { colour: p.ghost, steps, thin: true };
+            let was = tr!("trend.kept");
+            content.upper.extend(curve(kept, ChannelKind::Pv(slot), format!("{pv}, {was}"), look(false)));
+            content.lower.extend(curve(kept, ChannelKind::Mv(slot), format!("{mv}, {was}"), look(true)));
+        }
+        let sp = format!("SP {} [cm]", now.tag);
+        content.upper.extend(curve(view.run, ChannelKind::Setpoint(slot), sp, look(p.sp, true)));
+        content.upper.extend(curve(view.run, ChannelKind::Pv(slot), pv, look(p.pv, false)));
+        content.lower.extend(curve(view.run, ChannelKind::Mv(slot), mv, look(p.mv, true)));
     }
-    Content {
-        upper,
-        lower,
-        upper_axis: tr!("trend.level_axis"),
-        lower_axis: format!("MV [{}]", units.first().copied().unwrap_or("–")),
-        end_s: view.run.end_s(),
-    }
+    content
+}
+
+/// How a curve is drawn.
+struct Look {
+    colour: Color32,
+    steps: bool,
+    thin: bool,
+}
+
+fn curve(run: &RunTrace, kind: ChannelKind, name: String, look: Look) -> Option<Curve<'_>> {
+    let Look { colour, steps, thin } = look;
+    run.column(kind).map(|data| Curve { name, data, colour, steps, thin })
 }
 
 fn of_log<'a>(view: &View<'a>, p: &Palette) -> Content<'a> {
@@ -263,7 +238,7 @@ fn plot(
     let plot = Plot::new(if is_upper { "upper" } else { "lower" })
         .height(height)
         .show_background(true)
-        .allow_drag(vec2(1.0, 0.0).x > 0.0 && !state.brushing)
+        .allow_drag(!state.brushing)
         .allow_scroll(false)
         .allow_zoom(egui::Vec2b::new(true, false))
         .allow_boxed_zoom(false)
@@ -273,6 +248,12 @@ fn plot(
         .custom_x_axes(vec![plots::x_axis(time_label).formatter(time_axis)])
         .show_axes([true, true])
         .grid_color(p.grid)
+        .legend(
+            Legend::default()
+                .position(Corner::LeftTop)
+                .background_alpha(0.7)
+                .text_style(egui::TextStyle::Small),
+        )
         .set_margin_fraction(vec2(0.0, 0.12))
         .grid_spacing(egui::Rangef::new(9.0, 90.0))
         .label_formatter(move |position| {
@@ -388,7 +369,6 @@ fn draw_marks(
             free_from_s = mark.time_s + 0.16 * span;
         }
     }
-    let _ = HLine::new("", 0.0);
 }
 
 fn brush(r: &egui::Response, pointer: Option<PlotPoint>, state: &mut State, actions: &mut Vec<Action>) {

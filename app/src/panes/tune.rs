@@ -203,10 +203,10 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
         let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
         let hint =
             if row.gains.ti_s.is_finite() { tr!("tune.apply_hint") } else { tr!("tune.needs_integral") };
-        if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked() {
-            if let Some(tag) = tag {
-                actions.push(apply(view, row, tag));
-            }
+        if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked()
+            && let Some(tag) = tag
+        {
+            actions.push(apply(view, row, tag));
         }
         if ui.button(tr!("tune.copy")).clicked() {
             actions.push(Action::Copy(as_text(row)));

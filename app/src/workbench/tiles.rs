@@ -105,10 +105,10 @@ impl Behavior<PaneKind> for Panes<'_, '_> {
         tile_id: TileId,
         button: egui::Response,
     ) -> egui::Response {
-        if button.double_clicked() {
-            if let Some(kind) = tiles.get_pane(&tile_id) {
-                self.actions.push(Action::Maximise(*kind));
-            }
+        if button.double_clicked()
+            && let Some(kind) = tiles.get_pane(&tile_id)
+        {
+            self.actions.push(Action::Maximise(*kind));
         }
         button.on_hover_text(tr!("pane.tab_hint"))
     }

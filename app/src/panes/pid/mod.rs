@@ -100,12 +100,13 @@ fn valve_ui(
     if response.drag_started() {
         state.turning = Some((index, shown));
     }
-    if let Some((turned, angle)) = &mut state.turning {
-        if *turned == index && response.dragged() {
-            let moved = response.drag_delta();
-            *angle = (*angle + f64::from(moved.x - moved.y) * TURN_DEG).clamp(0.0, 90.0);
-            actions.push(turn(*angle));
-        }
+    if let Some((turned, angle)) = &mut state.turning
+        && *turned == index
+        && response.dragged()
+    {
+        let moved = response.drag_delta();
+        *angle = (*angle + f64::from(moved.x - moved.y) * TURN_DEG).clamp(0.0, 90.0);
+        actions.push(turn(*angle));
     }
     if response.drag_stopped() {
         state.turning = None;
