@@ -1,12 +1,12 @@
 //! Which channel goes to which entity, under which name and colour, and how a viewer lays them out.
 
 use rerun::blueprint::{
-    Blueprint, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial2DView, TextLogView,
-    TimePanel, TimeSeriesView, Vertical,
+    Blueprint, BlueprintPanel, ComponentSourceKind, ContainerLike, Horizontal, SelectionPanel, Spatial2DView,
+    TextLogView, TimePanel, TimeSeriesView, Vertical, VisualizableArchetype, Visualizer,
+    VisualizerComponentMapping,
 };
-use rerun::external::re_sdk_types::VisualizableArchetype;
 use rerun::external::re_sdk_types::blueprint::components::{PanelState, PlayState};
-use rerun::{Color, SeriesLines};
+use rerun::{Color, ComponentDescriptor, ComponentIdentifier, Scalars, SeriesLines};
 use vasos_engine::plant::Network;
 use vasos_engine::signal::{ChannelKind, ChannelSet};
 
@@ -14,9 +14,11 @@ use vasos_engine::signal::{ChannelKind, ChannelSet};
 pub const TIME: &str = "time";
 /// Timeline of the computer's clock.
 pub const WALL_CLOCK: &str = "wall_clock";
-/// Entity of the levels.
+/// Entity of all that is sampled; one chunk a batch, because an entity of its own costs some 1 kB a batch.
+pub const SIGNALS: &str = "signals";
+/// Component of the levels.
 pub const LEVELS: &str = "levels";
-/// Entity of flows, pump inputs, valve angles and spills.
+/// Component of flows, pump inputs, valve angles and spills.
 pub const FLOWS: &str = "flows";
 /// Entity of the events.
 pub const EVENTS: &str = "events";
@@ -37,11 +39,11 @@ const SERIES: [[u8; 3]; 8] = [
     [170, 170, 180],
 ];
 
-/// Channels that share an entity.
+/// Channels that share a component.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
-    /// Entity path.
-    pub path: String,
+    /// Component of [`SIGNALS`].
+    pub component: String,
     /// Title of its view.
     pub title: String,
     /// Columns of the run.
@@ -57,9 +59,9 @@ pub(super) struct Group {
 }
 
 impl Group {
-    fn new(path: String, title: String, is_loop: bool) -> Self {
+    fn new(component: String, title: String, is_loop: bool) -> Self {
         let none = || Vec::new();
-        Self { path, title, columns: none(), names: vec![], colors: vec![], shown: vec![], is_loop }
+        Self { component, title, columns: none(), names: vec![], colors: vec![], shown: vec![], is_loop }
     }
 
     fn push(&mut self, column: usize, channels: &ChannelSet, color: [u8; 3], shown: bool) {
@@ -70,8 +72,29 @@ impl Group {
         self.shown.push(shown);
     }
 
+    /// What the viewer is told of the component: numbers to draw.
+    ///
+    /// # Errors
+    /// When the component has no name.
+    pub fn descriptor(&self) -> Result<ComponentDescriptor, Box<dyn std::error::Error>> {
+        let component = ComponentIdentifier::try_new(&self.component)?;
+        let component_type = Scalars::descriptor_scalars().component_type;
+        Ok(ComponentDescriptor { archetype: None, component, component_type })
+    }
+
+    /// Lines of this component in a view.
+    fn visualizer(&self, shown: &[bool]) -> Visualizer {
+        let mapping = VisualizerComponentMapping {
+            target: Scalars::descriptor_scalars().component.as_str().into(),
+            source_kind: ComponentSourceKind::SourceComponent,
+            source_component: Some(self.component.as_str().into()),
+            selector: None,
+        };
+        self.series(shown).visualizer().with_mappings([mapping.into()])
+    }
+
     /// Names, colours and visibility for the viewer.
-    pub fn series(&self, shown: &[bool]) -> SeriesLines {
+    fn series(&self, shown: &[bool]) -> SeriesLines {
         let colors = self.colors.iter().map(|c| Color::from_rgb(c[0], c[1], c[2]));
         SeriesLines::new()
             .with_names(self.names.iter().map(String::as_str))
@@ -89,10 +112,10 @@ fn short(name: &str) -> &str {
         .unwrap_or(name)
 }
 
-/// The entities of a run: one a loop, one for the levels, one for flows and what drives them.
+/// The components of a run: one a loop, one for the levels, one for flows and what drives them.
 pub(super) fn groups(channels: &ChannelSet, network: &Network) -> Vec<Group> {
     let mut loops: Vec<Group> = (0..channels.slots)
-        .map(|slot| Group::new(format!("loops/{}", slot + 1), loop_title(network, slot), true))
+        .map(|slot| Group::new(format!("loop_{}", slot + 1), loop_title(network, slot), true))
         .collect();
     let mut levels = Group::new(LEVELS.to_owned(), "Levels (cm)".to_owned(), false);
     let mut flows = Group::new(FLOWS.to_owned(), "Flows (cm³/s)".to_owned(), false);
@@ -170,9 +193,9 @@ pub(super) fn blueprint(groups: &[Group]) -> (Blueprint, Vec<String>) {
 
 fn trend(group: &Group, title: &str, shown: &[bool]) -> ContainerLike {
     TimeSeriesView::new(title)
-        .with_origin(group.path.as_str())
-        .with_contents([format!("/{}", group.path)])
-        .with_override(group.path.as_str(), group.series(shown).visualizer())
+        .with_origin(SIGNALS)
+        .with_contents([format!("/{SIGNALS}")])
+        .with_override(SIGNALS, group.visualizer(shown))
         .into()
 }
 

@@ -6,11 +6,11 @@
 //! Each run (a session's run number) is a recording of its own in the one file, named `file · rig · run n`, so that
 //! `time` starts at 0 in each; the viewer lists them side by side.
 //!
-//! | entity | archetype | values, in this order | unit | how often |
+//! | entity | component or archetype | values, in this order | unit | how often |
 //! | --- | --- | --- | --- | --- |
-//! | `/loops/N`, N from 1 | `Scalars` | SP, PV, MV of loop slot N | cm, cm, the pump's unit | every sample |
-//! | `/levels` | `Scalars` | true level of each tank | cm | every sample |
-//! | `/flows` | `Scalars` | for each pump its input and arriving flow, each valve its flow and angle, each tank its spill | pump's unit, cm³/s, cm³/s, °, cm³/s | every sample |
+//! | `/signals` | `loop_N`, N from 1 | SP, PV, MV of loop slot N | cm, cm, the pump's unit | every sample |
+//! | `/signals` | `levels` | true level of each tank | cm | every sample |
+//! | `/signals` | `flows` | for each pump its input and arriving flow, each valve its flow and angle, each tank its spill | pump's unit, cm³/s, cm³/s, °, cm³/s | every sample |
 //! | `/events` | `TextLog` | what happened, with level | – | as it happens |
 //! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, when a level moves |
 //! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
@@ -21,7 +21,8 @@
 //! | `time` | duration | time of the run |
 //! | `wall_clock` | timestamp | the computer's clock when the row came out of the session |
 //!
-//! The names of the values are static (`SeriesLines`): the columns of [`vasos_engine::signal::ChannelSet`] with their
+//! The signals share one entity because each entity costs some 1 kB a batch. The blueprint maps its components to lines
+//! and names them: the columns of [`vasos_engine::signal::ChannelSet`] with their
 //! units in brackets. A value that does not exist, such as the PV before the first sample, is NaN.
 
 mod layout;
@@ -46,7 +47,7 @@ use rerun::grpc_server::GrpcServerSink;
 use rerun::{MemoryLimit, ServerOptions};
 use vasos_engine::session::Sink;
 
-pub use layout::{EVENTS, FLOWS, LEVELS, RIG, TIME, WALL_CLOCK};
+pub use layout::{EVENTS, FLOWS, LEVELS, RIG, SIGNALS, TIME, WALL_CLOCK};
 pub use read::{RecordedColumn, read_recording};
 pub use trouble::{RecordingError, RecordingTrouble};
 

@@ -10,7 +10,7 @@ use vasos_engine::plant::Network;
 use vasos_engine::session::Event;
 use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
 
-use super::layout::{EVENTS, Group, RIG, TIME, WALL_CLOCK, groups};
+use super::layout::{EVENTS, Group, RIG, SIGNALS, TIME, WALL_CLOCK, groups};
 use super::opening::blueprint_messages;
 use super::output::Output;
 use super::run_sink::Message;
@@ -121,9 +121,6 @@ impl Writer {
         for message in blueprint_messages(&groups)? {
             stream.record_msg(message);
         }
-        for group in &groups {
-            stream.log_static(group.path.as_str(), &group.series(&group.shown))?;
-        }
         let tanks = Tanks::new(network);
         stream.log_static(format!("{RIG}/walls"), &tanks.walls(network))?;
         stream.log_static(format!("{RIG}/pipes"), &tanks.pipes(network))?;
@@ -176,12 +173,16 @@ impl Run {
         let count = rows.time_s.len();
         let time = TimeColumn::new_duration_secs(TIME, rows.time_s.iter().copied());
         let wall = TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, rows.wall_ns.iter().copied());
+        let mut columns = Vec::new();
         for group in &self.groups {
             let scalars = rows.values.chunks(width).flat_map(|row| group.columns.iter().map(|&c| row[c]));
             let lengths = std::iter::repeat_n(group.columns.len(), count);
-            let columns = Scalars::new(scalars).columns(lengths)?;
-            self.stream.send_columns(group.path.as_str(), [time.clone(), wall.clone()], columns)?;
+            for mut column in Scalars::new(scalars).columns(lengths)? {
+                column.descriptor = group.descriptor()?;
+                columns.push(column);
+            }
         }
+        self.stream.send_columns(SIGNALS, [time, wall], columns)?;
         self.log_water(rows)
     }
 
