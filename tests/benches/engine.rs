@@ -42,7 +42,7 @@ fn an_hour(mut closed: ClosedLoop, samples: u64) -> f64 {
     let mut last = 0.0;
     for sample in 0..samples {
         if sample % (samples / 6) == 0 {
-            let level_cm = if sample / (samples / 6) % 2 == 0 { 10.0 } else { 12.0 };
+            let level_cm = if (sample / (samples / 6)).is_multiple_of(2) { 10.0 } else { 12.0 };
             for tag in &tags {
                 closed
                     .apply(&RigCommand::Setpoint { tag: tag.clone(), level_cm })

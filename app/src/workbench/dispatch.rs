@@ -8,6 +8,7 @@ use vasos_engine::document::{Consequence, Document, DocumentCommand, rig_command
 use vasos_engine::session::{Rig, RigCommand, SessionCommand};
 use vasos_io::recording::{Recording, RecordingOptions};
 
+use super::jobs::Outcome;
 use super::{Workbench, files, tiles};
 use crate::action::Action;
 use crate::journal::{self, Weight};
@@ -159,11 +160,14 @@ impl Workbench {
     fn toggle_recording(&mut self) {
         if let Some(recording) = self.recording.take() {
             self.session_command(SessionCommand::Detach { id: recording.id() });
-            let (path, rows) = (recording.path().display().to_string(), recording.rows());
-            match recording.close() {
-                Ok(()) => self.tell(Weight::Note, tr!("event.recorded", rows = rows, path = path)),
-                Err(trouble) => self.refuse(i18n::say(&trouble)),
-            }
+            // Closing waits for the recorder and tidies the file up: seconds, on a slow disk.
+            self.jobs.start("close", move || {
+                let (path, rows) = (recording.path().to_owned(), recording.rows());
+                match recording.close() {
+                    Ok(()) => Outcome::Recorded(path, rows),
+                    Err(trouble) => Outcome::Failed(Box::new(trouble)),
+                }
+            });
             return;
         }
         let path = vasos_io::settings::recordings_dir().join(format!("vasos-{}.rrd", text::stamp()));

@@ -85,6 +85,9 @@ impl Workbench {
                 }
                 Outcome::Model(model) => self.act(ctx, Action::Document(DocumentCommand::AddModel(model))),
                 Outcome::Chosen(path) => self.act(ctx, Action::OpenFile(path)),
+                Outcome::Recorded(path, rows) => {
+                    self.tell(Weight::Note, tr!("event.recorded", rows = rows, path = path.display()));
+                }
                 Outcome::Cancelled => {}
                 Outcome::NoDialog => self.path_field = Some(String::new()),
                 Outcome::Failed(error) => {

@@ -25,6 +25,8 @@ pub enum Outcome {
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.
     Model(Box<NewModel>),
+    /// A recording is complete, with so many rows.
+    Recorded(PathBuf, u64),
     /// A file was chosen.
     Chosen(PathBuf),
     /// The dialog was closed without a choice.
