@@ -30,6 +30,15 @@ pub fn brief(value: f64) -> String {
     fixed(value, (2.0 - magnitude).clamp(0.0, 6.0) as usize)
 }
 
+/// A number with two significant digits, for the half-width of an interval.
+#[must_use]
+pub fn rough(value: f64) -> String {
+    if !value.is_finite() || value == 0.0 {
+        return fixed(value, 0);
+    }
+    fixed(value, (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize)
+}
+
 /// The unit of a quotient of two, written the short way where there is one.
 #[must_use]
 pub fn quotient(over: &str, under: &str) -> String {

@@ -251,7 +251,7 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
         (dead_time_s, half(intervals.map(|i| i.dead_time_s))),
     ];
     for (value, half) in cells {
-        let plus = half.map_or(String::new(), |h| format!(" ±{}", text::brief(h)));
+        let plus = half.map_or(String::new(), |h| format!(" ±{}", text::rough(h)));
         ui.label(RichText::new(format!("{}{plus}", text::brief(value))).size(theme::TABLE));
     }
     let percent = entry.fit.as_ref().map_or("–".to_owned(), |f| text::fixed(f.fit_percent, 1));
@@ -337,6 +337,8 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
             plots::x_axis(tr!("trend.time_axis")).formatter(|mark, _| text::clock(mark.value)),
         ])
         .grid_color(p.grid)
+        .x_grid_spacer(plots::time_marks)
+        .y_grid_spacer(plots::decimal_marks)
         .show(ui, |plot| {
             plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
             plot.line(

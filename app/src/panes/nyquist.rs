@@ -67,6 +67,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         .custom_x_axes(vec![plots::x_axis("Re L(jω)")])
         .custom_y_axes(vec![plots::y_axis("Im L(jω)")])
         .grid_color(p.grid)
+        .x_grid_spacer(plots::decimal_marks)
+        .y_grid_spacer(plots::decimal_marks)
         .label_formatter(move |position| {
             let at = match position {
                 egui_plot::HoverPosition::NearDataPoint { position, .. }
@@ -155,6 +157,6 @@ fn circles(plot: &mut egui_plot::PlotUi<'_>, row: &Row, p: &theme::Palette) {
             plot.line(Line::new(name, line).stroke(edge).style(LineStyle::dashed_dense()));
         }
         let label = RichText::new(format!("Mt {}", text::brief(mt))).color(p.sp).size(theme::SMALL);
-        plot.text(Text::new("", PlotPoint::new(-0.47, -1.35), label).anchor(egui::Align2::LEFT_CENTER));
+        plot.text(Text::new("", PlotPoint::new(-0.54, -1.35), label).anchor(egui::Align2::RIGHT_CENTER));
     }
 }

@@ -255,7 +255,8 @@ fn plot(
                 .text_style(egui::TextStyle::Small),
         )
         .set_margin_fraction(vec2(0.0, 0.12))
-        .grid_spacing(egui::Rangef::new(9.0, 90.0))
+        .x_grid_spacer(plots::time_marks)
+        .y_grid_spacer(plots::decimal_marks)
         .label_formatter(move |position| {
             let at = |point: &PlotPoint| format!("{}\n{}", text::clock(point.x), text::fixed(point.y, 3));
             match position {

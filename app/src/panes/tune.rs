@@ -62,7 +62,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             state.form = if form == 1 { Form::Parallel } else { Form::Ideal };
         }
     });
-    let below = 64.0;
+    let below = 58.0;
     let height = (ui.available_height() - below).max(60.0);
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
         ui.set_min_width(88.0 + 9.0 * (COLUMN + 3.0) + 14.0);
@@ -112,7 +112,7 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
         .columns(Column::exact(COLUMN), 8)
         .column(Column::exact(COLUMN + 6.0))
         .min_scrolled_height(40.0)
-        .max_scroll_height(((height - HEAD - 14.0) / ROW).floor().max(1.0) * ROW)
+        .max_scroll_height(((height - HEAD - 4.0) / ROW).floor().max(1.0) * ROW)
         .auto_shrink([false, true])
         .header(HEAD, |mut header| {
             let small = |words: &str| RichText::new(words).size(theme::SMALL).color(p.weak);
