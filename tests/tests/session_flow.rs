@@ -1,16 +1,25 @@
 //! The session under everything a face can send.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rand::{Rng, RngExt, SeedableRng};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
-use vasos_engine::plant::Measurement;
+use vasos_engine::plant::{Measurement, Network};
 use vasos_engine::session::{CommandError, Event, EventKind, Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::sim::ClosedLoop;
 use vasos_io::rig::{PRESETS, preset};
 
 fn rig(id: &str) -> Rig {
     Rig { network: preset(id).expect("preset"), configuration: 0, measurement: Measurement::DEFAULT, seed: 1 }
+}
+
+/// A rig sampled so fast that many samples pass in a second of the test.
+fn fast(id: &str) -> Rig {
+    let mut spec = preset(id).expect("preset").spec.clone();
+    spec.sample_time_s = 0.05;
+    let network = Arc::new(Network::new(spec).expect("valid"));
+    Rig { network, ..rig(id) }
 }
 
 fn start(id: &str) -> Session {
@@ -127,7 +136,7 @@ fn manual_and_back_and_coupled_to_decoupled_bring_no_bump() {
 #[test]
 fn the_worker_survives_a_hundred_thousand_steps_of_random_commands() {
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(20_261_122);
-    let session = start("stad");
+    let session = Session::start(&fast("stad"), Box::new(|| ())).expect("starts");
     let mut slowest = Duration::ZERO;
     let (mut steps, mut sent) = (0_u64, 0_u64);
     assert!(session.send(SessionCommand::Speed(1000.0)) && session.send(SessionCommand::Run));
@@ -176,7 +185,7 @@ fn random_command(rng: &mut impl Rng) -> SessionCommand {
         3 => SessionCommand::Speed(if rng.random_bool(0.5) { 1000.0 } else { value }),
         4 if rng.random_bool(0.1) => {
             let id = PRESETS[rng.random_range(0..PRESETS.len())].id;
-            SessionCommand::Load(Box::new(rig(id)))
+            SessionCommand::Load(Box::new(fast(id)))
         }
         5..=8 => SessionCommand::Rig(RigCommand::Setpoint { tag: pick(rng, &loops), level_cm: value }),
         9..=11 => {

@@ -48,10 +48,16 @@ fn wait(harness: &mut Window, what: &str, mut done: impl FnMut(&Workbench) -> bo
 
 fn step(harness: &mut Window, samples: u64) {
     let wanted = harness.state().snapshot().samples + samples;
-    for _ in 0..samples {
-        act(harness, Action::Step);
-    }
+    send(harness, samples);
     wait(harness, "samples", |w| w.snapshot().samples >= wanted);
+}
+
+/// Asks for samples without drawing a frame for each.
+fn send(harness: &mut Window, samples: u64) {
+    let ctx = harness.ctx.clone();
+    for _ in 0..samples {
+        harness.state_mut().act(&ctx, Action::Step);
+    }
 }
 
 fn model_command() -> DocumentCommand {
@@ -267,12 +273,9 @@ fn the_window_looks_as_it_did() {
                 act(&mut harness, Action::ToggleTheme);
             }
             act(&mut harness, Action::Document(model_command()));
-            for i in 0..240 {
-                if i == 40 {
-                    act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 16.0)));
-                }
-                act(&mut harness, Action::Step);
-            }
+            send(&mut harness, 40);
+            act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 16.0)));
+            send(&mut harness, 200);
             let theme = if dark { "dark" } else { "light" };
             wait(&mut harness, "240 samples", |w| w.snapshot().samples == 240 && w.run().end_s() > 47.7);
             harness.remove_cursor();
@@ -289,9 +292,7 @@ fn the_window_looks_as_it_did() {
             }
             picture(&mut harness, &format!("coupled_{theme}_{name}"));
             act(&mut harness, Action::Document(DocumentCommand::Configuration(1)));
-            for _ in 0..60 {
-                act(&mut harness, Action::Step);
-            }
+            send(&mut harness, 60);
             wait(&mut harness, "300 samples", |w| w.snapshot().samples == 300 && w.run().end_s() > 59.7);
             harness.run_steps(2);
             picture(&mut harness, &format!("decoupled_{theme}_{name}"));

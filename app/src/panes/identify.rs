@@ -338,7 +338,7 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
         ])
         .grid_color(p.grid)
         .x_grid_spacer(plots::time_marks)
-        .y_grid_spacer(plots::decimal_marks)
+        .y_grid_spacer(plots::y_marks)
         .show(ui, |plot| {
             plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
             plot.line(

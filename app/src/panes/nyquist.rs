@@ -67,8 +67,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         .custom_x_axes(vec![plots::x_axis("Re L(jω)")])
         .custom_y_axes(vec![plots::y_axis("Im L(jω)")])
         .grid_color(p.grid)
-        .x_grid_spacer(plots::decimal_marks)
-        .y_grid_spacer(plots::decimal_marks)
+        .x_grid_spacer(plots::x_marks)
+        .y_grid_spacer(plots::y_marks)
         .label_formatter(move |position| {
             let at = match position {
                 egui_plot::HoverPosition::NearDataPoint { position, .. }

@@ -112,8 +112,8 @@ fn curves(
         .allow_scroll(false)
         .custom_y_axes(vec![plots::y_axis(format!("{}{unit}", if is_pv { "PV" } else { "MV" }))])
         .grid_color(p.grid)
-        .x_grid_spacer(plots::decimal_marks)
-        .y_grid_spacer(plots::decimal_marks)
+        .x_grid_spacer(plots::x_marks)
+        .y_grid_spacer(plots::y_marks)
         .include_y(0.0);
     let time_label = if is_pv { String::new() } else { tr!("step.time_axis") };
     plot = plot.custom_x_axes(vec![plots::x_axis(time_label)]);

@@ -256,7 +256,7 @@ fn plot(
         )
         .set_margin_fraction(vec2(0.0, 0.12))
         .x_grid_spacer(plots::time_marks)
-        .y_grid_spacer(plots::decimal_marks)
+        .y_grid_spacer(plots::y_marks)
         .label_formatter(move |position| {
             let at = |point: &PlotPoint| format!("{}\n{}", text::clock(point.x), text::fixed(point.y, 3));
             match position {

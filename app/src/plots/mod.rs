@@ -16,47 +16,68 @@ fn spacing(least: f32) -> Rangef {
 
 /// A horizontal axis.
 #[must_use]
-pub fn x_axis(label: impl Into<String>) -> AxisHints<'static> {
-    AxisHints::new_x().label(label.into()).label_spacing(spacing(X_SPACING))
+pub fn x_axis(name: impl Into<String>) -> AxisHints<'static> {
+    AxisHints::new_x().label(name.into()).label_spacing(spacing(X_SPACING)).formatter(label)
 }
 
 /// A vertical axis.
 #[must_use]
-pub fn y_axis(label: impl Into<String>) -> AxisHints<'static> {
-    AxisHints::new_y().label(label.into()).label_spacing(spacing(Y_SPACING)).min_thickness(Y_WIDTH)
+pub fn y_axis(name: impl Into<String>) -> AxisHints<'static> {
+    AxisHints::new_y()
+        .label(name.into())
+        .label_spacing(spacing(Y_SPACING))
+        .formatter(label)
+        .min_thickness(Y_WIDTH)
 }
 
-/// About so many marks on an axis.
-const MARKS: f64 = 5.0;
+/// What egui_plot's recommended step stands for on the screen, in points.
+const RECOMMENDED: f64 = 8.0;
 /// Steps of a time axis in seconds; beyond them, whole multiples of ten hours.
 const TIME_STEPS_S: [f64; 20] = [
-    0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0, 7200.0, 10_800.0,
-    21_600.0, 36_000.0,
+    0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0,
+    7200.0, 10_800.0, 21_600.0, 36_000.0,
 ];
 
-/// Marks every 1, 2 or 5 times a power of ten.
-#[must_use]
-pub fn decimal_marks(input: GridInput) -> Vec<GridMark> {
+/// Smallest step whose labels have room.
+fn least_step(input: &GridInput, spacing: f32) -> Option<f64> {
+    let step = input.base_step_size / RECOMMENDED * f64::from(spacing) * 1.1;
     let span = input.bounds.1 - input.bounds.0;
-    let rough = span / MARKS;
-    if !(rough.is_finite() && rough > 0.0) {
-        return vec![];
-    }
-    let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= rough).unwrap_or(10.0 * power);
+    (step.is_finite() && step > 0.0 && span.is_finite() && span > 0.0).then_some(step)
+}
+
+fn decimal_marks(input: &GridInput, spacing: f32) -> Vec<GridMark> {
+    let Some(least) = least_step(input, spacing) else { return vec![] };
+    let power = 10f64.powf(least.log10().floor());
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= least).unwrap_or(10.0 * power);
     marks(input.bounds, step)
+}
+
+/// Marks of a horizontal axis every 1, 2 or 5 times a power of ten.
+#[must_use]
+pub fn x_marks(input: GridInput) -> Vec<GridMark> {
+    decimal_marks(&input, X_SPACING)
+}
+
+/// Marks of a vertical axis every 1, 2 or 5 times a power of ten.
+#[must_use]
+pub fn y_marks(input: GridInput) -> Vec<GridMark> {
+    decimal_marks(&input, 1.3 * Y_SPACING)
 }
 
 /// Marks at whole steps of a clock.
 #[must_use]
 pub fn time_marks(input: GridInput) -> Vec<GridMark> {
-    let rough = (input.bounds.1 - input.bounds.0) / (MARKS + 1.0);
-    if !(rough.is_finite() && rough > 0.0) {
-        return vec![];
-    }
-    let tens_of_hours = (rough / 36_000.0).ceil() * 36_000.0;
-    let step = TIME_STEPS_S.into_iter().find(|s| *s >= rough).unwrap_or(tens_of_hours);
+    let Some(least) = least_step(&input, 1.3 * X_SPACING) else { return vec![] };
+    let tens_of_hours = (least / 36_000.0).ceil() * 36_000.0;
+    let step = TIME_STEPS_S.into_iter().find(|s| *s >= least).unwrap_or(tens_of_hours);
     marks(input.bounds, step)
+}
+
+/// A mark's value with the decimals that its step needs.
+fn label(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
+    let decimals = (-mark.step_size.log10().floor()).clamp(0.0, 9.0) as usize;
+    crate::text::fixed(mark.value, decimals)
 }
 
 fn marks(bounds: (f64, f64), step_size: f64) -> Vec<GridMark> {
@@ -73,13 +94,21 @@ mod tests {
         marks.iter().map(|m| m.value).collect()
     }
 
+    /// A plot of so many points from `low` to `high`.
+    fn plot(points: f64, low: f64, high: f64) -> GridInput {
+        GridInput { bounds: (low, high), base_step_size: RECOMMENDED * (high - low) / points }
+    }
+
     #[test]
-    fn marks_are_round_and_in_view() {
-        let input = |low: f64, high: f64| GridInput { bounds: (low, high), base_step_size: 0.1 };
-        assert_eq!(values(&decimal_marks(input(14.7, 16.3))), [15.0, 15.5, 16.0]);
-        assert_eq!(values(&time_marks(input(0.0, 315.0))), [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
-        assert_eq!(values(&time_marks(input(11_000.0, 11_300.0))).len(), 5);
-        assert!(decimal_marks(input(1.0, 1.0)).is_empty() && time_marks(input(f64::NAN, 1.0)).is_empty());
-        assert!(time_marks(input(0.0, 1e9)).len() <= 201);
+    fn marks_are_round_and_have_room() {
+        assert_eq!(values(&y_marks(plot(100.0, 14.7, 16.3))), [15.0, 15.5, 16.0]);
+        assert_eq!(values(&time_marks(plot(520.0, 0.0, 315.0))), [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
+        assert_eq!(values(&time_marks(plot(200.0, 0.0, 315.0))), [0.0, 300.0]);
+        assert!(
+            y_marks(plot(100.0, 1.0, 1.0)).is_empty() && time_marks(plot(100.0, f64::NAN, 1.0)).is_empty()
+        );
+        assert!(time_marks(plot(400.0, 0.0, 1e9)).len() <= 201);
+        let half = GridMark { value: 2.5, step_size: 0.5 };
+        assert_eq!(label(half, &(0.0..=3.0)), "2.5");
     }
 }
