@@ -173,7 +173,7 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let mut filter_changed = false;
     let mut done = false;
     ui.style_mut().drag_value_text_style = egui::TextStyle::Small;
-    egui::Grid::new("tuning").num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
+    egui::Grid::new("tuning").min_col_width(14.0).num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
         let mut field =
             |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
                 let name = ui.label(name).on_hover_text(&hint);

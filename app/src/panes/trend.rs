@@ -244,16 +244,10 @@ fn plot(
         .allow_boxed_zoom(false)
         .allow_double_click_reset(false)
         .link_cursor(Id::unique("trend"), [true, false])
-        .custom_y_axes(vec![plots::y_axis(axis.clone())])
+        .custom_y_axes(vec![plots::y_axis(axis.clone()).min_thickness(plots::WIDE_Y_WIDTH)])
         .custom_x_axes(vec![plots::x_axis(time_label).formatter(time_axis)])
         .show_axes([true, true])
         .grid_color(p.grid)
-        .legend(
-            Legend::default()
-                .position(Corner::LeftTop)
-                .background_alpha(0.7)
-                .text_style(egui::TextStyle::Small),
-        )
         .set_margin_fraction(vec2(0.0, 0.12))
         .x_grid_spacer(plots::time_marks)
         .y_grid_spacer(plots::y_marks)
@@ -269,6 +263,10 @@ fn plot(
                 egui_plot::HoverPosition::Elsewhere { position } => Some(at(position)),
             }
         });
+    // On a low plot a legend would hide the curves; its axis names the only one.
+    let legend =
+        Legend::default().position(Corner::LeftTop).background_alpha(0.7).text_style(egui::TextStyle::Small);
+    let plot = if height > 90.0 { plot.legend(legend) } else { plot };
     let bounds = state.bounds_s;
     let (brushing, follow) = (state.brushing, state.follow);
     let pixels = ui.available_width().max(100.0) as usize;

@@ -192,8 +192,13 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let p = theme::palette(ui);
     let words = row.warnings.iter().map(|w| i18n::say(w)).collect::<Vec<_>>().join(" · ");
     let words = if row.analysis.stable { words } else { tr!("tune.unstable_hint") };
-    let source = if words.is_empty() { row.source.to_owned() } else { format!("! {words}") };
-    let colour = if words.is_empty() { p.weak } else { p.caution };
+    let flagged = !row.analysis.stable || row.warnings.iter().any(|w| w.limits_validity());
+    let source = match (words.is_empty(), flagged) {
+        (true, _) => row.source.to_owned(),
+        (false, true) => format!("! {words}"),
+        (false, false) => words,
+    };
+    let colour = if flagged { p.caution } else { p.weak };
     let line = ui.add(egui::Label::new(RichText::new(&source).size(theme::SMALL).color(colour)).truncate());
     line.on_hover_text(format!("{source}\n{}", row.source));
     ui.horizontal_wrapped(|ui| {

@@ -7,7 +7,9 @@ use egui_plot::{AxisHints, GridInput, GridMark};
 const X_SPACING: f32 = 56.0;
 const Y_SPACING: f32 = 19.0;
 /// Width kept for the labels of a vertical axis, so that plots above each other line up.
-const Y_WIDTH: f32 = 60.0;
+const Y_WIDTH: f32 = 56.0;
+/// The same for the trend, whose values may be long.
+pub const WIDE_Y_WIDTH: f32 = 72.0;
 
 /// Labels appear at full strength or not at all: half-faded ones cannot be read on a projector.
 fn spacing(least: f32) -> Rangef {
@@ -71,7 +73,11 @@ pub fn time_marks(input: GridInput) -> Vec<GridMark> {
     let Some(least) = least_step(&input, 1.3 * X_SPACING) else { return vec![] };
     let tens_of_hours = (least / 36_000.0).ceil() * 36_000.0;
     let step = TIME_STEPS_S.into_iter().find(|s| *s >= least).unwrap_or(tens_of_hours);
-    marks(input.bounds, step)
+    // A label at the very end would be cut in half.
+    let half_label = 0.4 * least;
+    let mut marks = marks(input.bounds, step);
+    marks.retain(|m| input.bounds.1 - m.value >= half_label);
+    marks
 }
 
 /// A mark's value with the decimals that its step needs.
@@ -102,8 +108,8 @@ mod tests {
     #[test]
     fn marks_are_round_and_have_room() {
         assert_eq!(values(&y_marks(plot(100.0, 14.7, 16.3))), [15.0, 15.5, 16.0]);
-        assert_eq!(values(&time_marks(plot(520.0, 0.0, 315.0))), [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]);
-        assert_eq!(values(&time_marks(plot(200.0, 0.0, 315.0))), [0.0, 300.0]);
+        assert_eq!(values(&time_marks(plot(520.0, 0.0, 315.0))), [0.0, 60.0, 120.0, 180.0, 240.0]);
+        assert_eq!(values(&time_marks(plot(200.0, 0.0, 315.0))), [0.0]);
         assert!(
             y_marks(plot(100.0, 1.0, 1.0)).is_empty() && time_marks(plot(100.0, f64::NAN, 1.0)).is_empty()
         );
