@@ -221,10 +221,24 @@ fn from_a_dropped_log_to_a_tuned_loop() {
     });
 }
 
+/// A file as the system hands it over when it is let go above the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl eframe::egui::DroppedFile for Dropped {
+    fn path(&self) -> &std::path::Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
 fn drop_on(harness: &mut Window, path: PathBuf) {
-    let ctx = harness.ctx.clone();
-    harness.state_mut().act(&ctx, Action::OpenFile(path));
+    harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(path)));
     harness.run_steps(1);
+    assert!(harness.state().is_busy() || !harness.state().journal().is_empty(), "the drop was noticed");
 }
 
 /// The issue: bad input gets a clear error and loses nothing.

@@ -168,7 +168,7 @@ fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Actio
     let gains = settings.tuning.gains;
     let mut edited = settings.tuning;
     let mut filter_s = settings.pv_filter_s;
-    let width = ((ui.available_width() - 66.0) / 2.0).clamp(48.0, 84.0);
+    let width = ((ui.available_width() - 72.0) / 2.0).clamp(48.0, 84.0);
     let mut changed = false;
     let mut filter_changed = false;
     let mut done = false;

@@ -7,7 +7,7 @@ use egui_plot::{AxisHints, GridInput, GridMark};
 const X_SPACING: f32 = 56.0;
 const Y_SPACING: f32 = 19.0;
 /// Width kept for the labels of a vertical axis, so that plots above each other line up.
-const Y_WIDTH: f32 = 46.0;
+const Y_WIDTH: f32 = 60.0;
 
 /// Labels appear at full strength or not at all: half-faded ones cannot be read on a projector.
 fn spacing(least: f32) -> Rangef {

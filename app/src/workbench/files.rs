@@ -61,13 +61,14 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
 }
 
 impl Workbench {
-    /// Opens what was dropped on the window.
-    pub(super) fn take_dropped(&mut self, ctx: &egui::Context) {
-        let dropped: Vec<PathBuf> =
-            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
-        if let Some(path) = dropped.into_iter().next() {
-            self.act(ctx, Action::OpenFile(path));
+    /// Opens what was dropped on the window in this frame. A frame drawn twice brings the same drop twice.
+    pub(super) fn take_dropped(&mut self, ui: &egui::Ui, actions: &mut Vec<Action>) {
+        let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().cloned()) else { return };
+        if self.dropped.as_ref().is_some_and(|known| std::sync::Arc::ptr_eq(known, &dropped)) {
+            return;
         }
+        actions.push(Action::OpenFile(dropped.path().to_owned()));
+        self.dropped = Some(dropped);
     }
 
     /// Takes what jobs came to.

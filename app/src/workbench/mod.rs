@@ -58,6 +58,7 @@ pub struct Workbench {
     recording: Option<vasos_io::recording::Recording>,
     path_field: Option<String>,
     notice: Option<String>,
+    dropped: Option<egui::DroppedFileHandle>,
     options: Options,
     title: String,
 }
@@ -101,6 +102,7 @@ impl Workbench {
             recording: None,
             path_field: None,
             notice: None,
+            dropped: None,
             settings,
             title: String::new(),
             options,
@@ -182,7 +184,6 @@ impl Workbench {
                 journal::add(&mut self.journal, journal::entry(Weight::Alarm, words));
             }
         }
-        self.take_dropped(ctx);
         self.set_title(ctx);
     }
 
@@ -191,6 +192,7 @@ impl Workbench {
         let snapshot = self.session.snapshot();
         let document = self.history.document().clone();
         let mut actions = self.keys(ui);
+        self.take_dropped(ui, &mut actions);
         actions.extend(self.top_bar(ui, &snapshot, &document));
         actions.extend(self.status_bar(ui, &snapshot, &document));
         let view = View {

@@ -6,6 +6,7 @@
 
 mod error;
 mod flow_law;
+mod integrator;
 mod network;
 mod pipe;
 mod sensor;
