@@ -13,6 +13,7 @@ use std::path::PathBuf;
 use eframe::egui;
 use vasos_engine::document::{Document, History, SourceChoice};
 use vasos_engine::session::{Rig, Session, SessionCommand};
+use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
 use crate::action::Action;
@@ -143,6 +144,18 @@ impl Workbench {
     #[must_use]
     pub fn run(&self) -> &RunTrace {
         &self.run
+    }
+
+    /// Rules compared on the model in use.
+    #[must_use]
+    pub fn tuning(&self) -> &TuningTable {
+        &self.tuning
+    }
+
+    /// Takes samples as if the session had delivered them, for benchmarks and pictures of long runs; the session's own
+    /// begin afresh.
+    pub fn preload(&mut self, block: &SampleBlock) {
+        self.run.take(block);
     }
 
     /// Whether a fit or an import is under way.

@@ -83,8 +83,9 @@ impl Settings {
         if self.zoom.is_finite() { self.zoom.clamp(ZOOM[0], ZOOM[1]) } else { 1.0 }
     }
 
-    /// Puts a file in front of the recent ones.
+    /// Puts a file in front of the recent ones, by its whole path: the next start may be from another folder.
     pub fn remember(&mut self, path: PathBuf) {
+        let path = std::path::absolute(&path).unwrap_or(path);
         self.recent.retain(|p| *p != path);
         self.recent.insert(0, path);
         self.recent.truncate(MOST_RECENT);
