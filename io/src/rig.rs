@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::{Network, RigError, RigSpec};
+use vasos_engine::session::CommandError;
 use vasos_engine::signal::ChannelSet;
-use vasos_engine::sim::{Run, Scenario};
+use vasos_engine::sim::{Run, Scenario, check_starts};
 
 /// A preset that ships with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +55,16 @@ pub enum FileError {
         /// What is wrong.
         error: RigError,
     },
+    /// It describes a rig that cannot start.
+    #[error("{name}: the rig cannot start in the configuration '{configuration}': {error}")]
+    Start {
+        /// File name.
+        name: String,
+        /// Id of the configuration; the rig's where it has none.
+        configuration: String,
+        /// Why not.
+        error: CommandError,
+    },
     /// It cannot be written.
     #[error("{path} cannot be written: {reason}")]
     Write {
@@ -70,6 +81,7 @@ impl Explain for FileError {
             Self::Read { .. } => "file.read",
             Self::Format { .. } => "file.format",
             Self::Rig { .. } => "file.rig",
+            Self::Start { .. } => "file.start",
             Self::Write { .. } => "file.write",
         }
     }
@@ -83,12 +95,18 @@ impl Explain for FileError {
                 vec![("name", name.clone()), ("line", line.to_string()), ("reason", reason.clone())]
             }
             Self::Rig { name, error } => vec![("name", name.clone()), ("error", error.to_string())],
+            Self::Start { name, configuration, error } => vec![
+                ("name", name.clone()),
+                ("configuration", configuration.clone()),
+                ("error", error.to_string()),
+            ],
         }
     }
 
     fn cause(&self) -> Option<&dyn Explain> {
         match self {
             Self::Rig { error, .. } => Some(error),
+            Self::Start { error, .. } => Some(error),
             _ => None,
         }
     }
@@ -103,6 +121,11 @@ impl FileError {
             Self::Read { path: text("a.toml"), reason: text("not found") },
             Self::Format { name: text("a.toml"), line: 3, reason: text("expected a number") },
             Self::Rig { name: text("a.toml"), error: RigError::NoTank },
+            Self::Start {
+                name: text("a.toml"),
+                configuration: text("coupled"),
+                error: CommandError::UnknownTag { tag: text("LIC-01") },
+            },
             Self::Write { path: text("a.csv"), reason: text("disk full") },
         ]
     }
@@ -123,11 +146,17 @@ pub fn preset(id: &str) -> Result<Arc<Network>, FileError> {
 /// A rig from the text of its file; `name` stands in errors.
 ///
 /// # Errors
-/// [`FileError`] with the line, or with the item and value that cannot be.
+/// [`FileError`] with the line, the item and value that cannot be, or the configuration that cannot start.
 pub fn parse_rig(name: &str, text: &str) -> Result<Arc<Network>, FileError> {
     let spec: RigSpec = parse(name, text)?;
     let network = Network::new(spec).map_err(|error| FileError::Rig { name: name.to_owned(), error })?;
-    Ok(Arc::new(network))
+    let network = Arc::new(network);
+    check_starts(&network).map_err(|start| FileError::Start {
+        name: name.to_owned(),
+        configuration: start.configuration,
+        error: start.error,
+    })?;
+    Ok(network)
 }
 
 /// A rig by preset id, or by path of a file.

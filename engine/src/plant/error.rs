@@ -16,8 +16,16 @@ pub enum RigError {
     /// A rig without a tank.
     #[error("the rig has no tank: add at least one [[tank]]")]
     NoTank,
+    /// An id or signal that cannot be a column, a path or an argument.
+    #[error("'{id}' is not possible as an id or signal: use letters, digits, _, - and . without blanks")]
+    Name {
+        /// Offending name.
+        id: String,
+    },
     /// The same tag twice.
-    #[error("the tag {id} is used twice: every tank, pump, valve, sensor and signal needs a name of its own")]
+    #[error(
+        "the tag {id} is used twice: every tank, pump, valve, sensor, loop, configuration and signal needs a name of its own"
+    )]
     Duplicate {
         /// Tag.
         id: String,
@@ -95,6 +103,7 @@ impl Explain for RigError {
         match self {
             Self::Schema { .. } => "rig.schema",
             Self::NoTank => "rig.no_tank",
+            Self::Name { .. } => "rig.name",
             Self::Duplicate { .. } => "rig.duplicate",
             Self::Unknown { .. } => "rig.unknown",
             Self::Value { .. } => "rig.value",
@@ -110,7 +119,7 @@ impl Explain for RigError {
         match self {
             Self::Schema { found, known } => vec![("found", found.to_string()), ("known", known.to_string())],
             Self::NoTank => vec![],
-            Self::Duplicate { id } => vec![("id", id.clone())],
+            Self::Name { id } | Self::Duplicate { id } => vec![("id", id.clone())],
             Self::Unknown { item, reference } => {
                 vec![("item", item.clone()), ("reference", reference.clone())]
             }
@@ -144,6 +153,7 @@ impl RigError {
         vec![
             Self::Schema { found: 7, known: 1 },
             Self::NoTank,
+            Self::Name { id: text("TQ 1") },
             Self::Duplicate { id: text("TQ1") },
             Self::Unknown { item: text("FV01"), reference: text("TQ9") },
             Self::Value { item: text("TQ1"), field: "area_cm2", value: -1.0, expected: text("> 0") },

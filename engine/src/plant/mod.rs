@@ -7,6 +7,7 @@
 mod error;
 mod flow_law;
 mod integrator;
+mod names;
 mod network;
 mod pipe;
 mod sensor;

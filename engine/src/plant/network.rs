@@ -1,12 +1,20 @@
 //! The checked tank network: indices instead of names, every number in its range.
 
-use std::collections::HashSet;
-
 use super::error::RigError;
+use super::names::check_names;
 use super::spec::{ConfigurationSpec, InputUnit, RigSpec, SensorSpec, ValveDrive, ValveLaw};
 
 /// The schema of rig files this version reads.
 pub const RIG_SCHEMA: u32 = 1;
+
+/// Bound on sizes, flows and coefficients: far beyond any rig, far from where sums and products overflow.
+const MOST: f64 = 1e9;
+/// Least size of a tank in cm and cm² and of a converter in V and Ω, so that quotients stay numbers.
+const LEAST_SIZE: f64 = 1e-6;
+/// Farthest place and widest tank of the drawing, in grid units.
+const MOST_GRID: f64 = 1000.0;
+/// Shortest transport delay other than none, in seconds: the integrator takes at least a step in each.
+const SHORTEST_DELAY_S: f64 = 1e-3;
 
 /// One tank of the network.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,6 +137,11 @@ fn value(
     }
 }
 
+fn check_delay(item: &str, delay_s: f64) -> Result<(), RigError> {
+    let ok = delay_s == 0.0 || (SHORTEST_DELAY_S..=3600.0).contains(&delay_s);
+    value(item, "delay_s", delay_s, ok, "0 or 0.001…3600")
+}
+
 impl Network {
     /// Checks a description.
     ///
@@ -142,12 +155,26 @@ impl Network {
             return Err(RigError::NoTank);
         }
         check_names(&spec)?;
-        value(&spec.id, "delta_cm", spec.delta_cm, spec.delta_cm >= 0.0, "≥ 0")?;
-        value(&spec.id, "sample_time_s", spec.sample_time_s, spec.sample_time_s > 0.0, "> 0")?;
+        value(&spec.id, "delta_cm", spec.delta_cm, (0.0..=MOST).contains(&spec.delta_cm), "0…1e9")?;
+        let sampled = (1e-3..=3600.0).contains(&spec.sample_time_s);
+        value(&spec.id, "sample_time_s", spec.sample_time_s, sampled, "0.001…3600")?;
         if let Some(c) = &spec.converters {
-            value(&spec.id, "shunt_ohm", c.shunt_ohm, c.shunt_ohm > 0.0, "> 0")?;
-            value(&spec.id, "adc_full_scale_v", c.adc_full_scale_v, c.adc_full_scale_v > 0.0, "> 0")?;
-            value(&spec.id, "dac_full_scale_v", c.dac_full_scale_v, c.dac_full_scale_v > 0.0, "> 0")?;
+            let sizes = LEAST_SIZE..=MOST;
+            value(&spec.id, "shunt_ohm", c.shunt_ohm, sizes.contains(&c.shunt_ohm), "1e-6…1e9")?;
+            value(
+                &spec.id,
+                "adc_full_scale_v",
+                c.adc_full_scale_v,
+                sizes.contains(&c.adc_full_scale_v),
+                "1e-6…1e9",
+            )?;
+            value(
+                &spec.id,
+                "dac_full_scale_v",
+                c.dac_full_scale_v,
+                sizes.contains(&c.dac_full_scale_v),
+                "1e-6…1e9",
+            )?;
             value(&spec.id, "adc_bits", f64::from(c.adc_bits), (1..=32).contains(&c.adc_bits), "1…32")?;
             value(&spec.id, "dac_bits", f64::from(c.dac_bits), (1..=32).contains(&c.dac_bits), "1…32")?;
         }
@@ -204,7 +231,7 @@ impl Network {
         }
         for (id, &delay) in &configuration.delays_s {
             self.pump(id).ok_or_else(|| unknown(id))?;
-            value(id, "delay_s", delay, (0.0..=3600.0).contains(&delay), "0…3600")?;
+            check_delay(id, delay)?;
         }
         for (i, spec) in configuration.loops.iter().enumerate() {
             let sensor = self.sensor(&spec.sensor).ok_or_else(|| unknown(&spec.sensor))?;
@@ -225,29 +252,6 @@ impl Network {
     }
 }
 
-fn check_names(spec: &RigSpec) -> Result<(), RigError> {
-    let mut tags = HashSet::new();
-    let mut signals = HashSet::new();
-    let ids = (spec.tanks.iter().map(|t| &t.id))
-        .chain(spec.pumps.iter().map(|p| &p.id))
-        .chain(spec.valves.iter().map(|v| &v.id))
-        .chain(spec.sensors.iter().map(|s| &s.id));
-    let names = (spec.tanks.iter().map(|t| &t.signal))
-        .chain(spec.pumps.iter().flat_map(|p| [&p.signal, &p.flow_signal]))
-        .chain(spec.valves.iter().map(|v| &v.signal));
-    for id in ids {
-        if !tags.insert(id) {
-            return Err(RigError::Duplicate { id: id.clone() });
-        }
-    }
-    for name in names {
-        if !signals.insert(name) {
-            return Err(RigError::Duplicate { id: name.clone() });
-        }
-    }
-    Ok(())
-}
-
 fn tank_index(spec: &RigSpec, item: &str, id: &str) -> Result<usize, RigError> {
     spec.tanks
         .iter()
@@ -259,8 +263,15 @@ fn tanks(spec: &RigSpec) -> Result<Vec<Tank>, RigError> {
     spec.tanks
         .iter()
         .map(|t| {
-            value(&t.id, "area_cm2", t.area_cm2, t.area_cm2 > 0.0, "> 0")?;
-            value(&t.id, "height_cm", t.height_cm, t.height_cm > 0.0, "> 0")?;
+            let sizes = LEAST_SIZE..=MOST;
+            value(&t.id, "area_cm2", t.area_cm2, sizes.contains(&t.area_cm2), "1e-6…1e9")?;
+            value(&t.id, "height_cm", t.height_cm, sizes.contains(&t.height_cm), "1e-6…1e9")?;
+            for place in t.at.into_iter().flatten() {
+                value(&t.id, "at", place, place.abs() <= MOST_GRID, "-1000…1000")?;
+            }
+            if let Some(width) = t.width {
+                value(&t.id, "width", width, width > 0.0 && width <= MOST_GRID, "> 0 and ≤ 1000")?;
+            }
             let in_tank = (0.0..=t.height_cm).contains(&t.initial_cm);
             value(&t.id, "initial_cm", t.initial_cm, in_tank, format!("0…{} (rim)", t.height_cm))?;
             let spills_to = t.spills_to.as_deref().map(|o| tank_index(spec, &t.id, o)).transpose()?;
@@ -281,15 +292,20 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
             if from == Some(to) {
                 return Err(RigError::Loop { item: p.id.clone(), tank: p.to.clone() });
             }
-            value(&p.id, "max", p.max, p.max > p.min && p.min.is_finite(), format!("> min = {}", p.min))?;
+            value(&p.id, "min", p.min, p.min.abs() <= MOST, "-1e9…1e9")?;
+            let above = p.max > p.min && p.max <= MOST;
+            value(&p.id, "max", p.max, above, format!("> min = {} and ≤ 1e9", p.min))?;
             let in_range = (p.min..=p.max).contains(&p.initial);
             value(&p.id, "initial", p.initial, in_range, format!("{}…{}", p.min, p.max))?;
-            value(&p.id, "delay_s", p.delay_s, (0.0..=3600.0).contains(&p.delay_s), "0…3600")?;
+            check_delay(&p.id, p.delay_s)?;
             let rate = p.rate_limit.unwrap_or(f64::MAX);
             value(&p.id, "rate_limit", rate, rate > 0.0, "> 0")?;
             let increasing = p.curve.len() >= 2 && p.curve.windows(2).all(|w| w[1][0] > w[0][0]);
             if !increasing || p.curve.iter().any(|q| !q[0].is_finite() || !q[1].is_finite() || q[1] < 0.0) {
                 return Err(RigError::Curve { item: p.id.clone() });
+            }
+            for &point in p.curve.as_flattened() {
+                value(&p.id, "curve", point, point.abs() <= MOST, "within ±1e9")?;
             }
             Ok(Pump {
                 from,
@@ -316,7 +332,7 @@ fn valves(spec: &RigSpec) -> Result<Vec<Valve>, RigError> {
             if v.drive == ValveDrive::Between && to.is_none() {
                 return Err(RigError::Unknown { item: v.id.clone(), reference: "to".to_owned() });
             }
-            value(&v.id, "k90", v.k90, v.k90 >= 0.0, "≥ 0")?;
+            value(&v.id, "k90", v.k90, (0.0..=MOST).contains(&v.k90), "0…1e9")?;
             value(&v.id, "exponent", v.exponent, v.exponent > 0.0, "> 0")?;
             value(&v.id, "angle_deg", v.angle_deg, (0.0..=90.0).contains(&v.angle_deg), "0…90")?;
             Ok(Valve { from, to, drive: v.drive, law: v.law, k90: v.k90, exponent: v.exponent })
@@ -329,10 +345,11 @@ fn sensors(spec: &RigSpec) -> Result<Vec<Sensor>, RigError> {
         .iter()
         .map(|s| {
             let tank = tank_index(spec, &s.id, &s.tank)?;
-            value(&s.id, "noise_cm", s.noise_cm, s.noise_cm >= 0.0, "≥ 0")?;
-            value(&s.id, "resolution_cm", s.resolution_cm, s.resolution_cm >= 0.0, "≥ 0")?;
+            value(&s.id, "noise_cm", s.noise_cm, (0.0..=MOST).contains(&s.noise_cm), "0…1e9")?;
+            value(&s.id, "resolution_cm", s.resolution_cm, (0.0..=MOST).contains(&s.resolution_cm), "0…1e9")?;
             if let Some([low, high]) = s.range_cm {
-                value(&s.id, "range_cm", high, low.is_finite() && high > low, format!("> {low}"))?;
+                value(&s.id, "range_cm", low, low.abs() <= MOST, "-1e9…1e9")?;
+                value(&s.id, "range_cm", high, high > low && high <= MOST, format!("> {low} and ≤ 1e9"))?;
             }
             Ok(Sensor { tank, spec: s.clone() })
         })

@@ -2,6 +2,8 @@
 
 mod closed_loop;
 mod scenario;
+mod start;
 
 pub use closed_loop::{ActiveLoop, ClosedLoop};
 pub use scenario::{Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario};
+pub use start::{StartError, check_starts};

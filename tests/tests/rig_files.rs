@@ -1,0 +1,126 @@
+//! Rig files that say what no rig can be are refused when they are read, with the field at fault.
+
+use vasos_engine::plant::RigError;
+use vasos_engine::session::CommandError;
+use vasos_io::rig::{FileError, PRESETS, parse_rig};
+
+/// The smallest preset with a part of its text replaced.
+fn changed(from: &str, to: &str) -> Result<(), FileError> {
+    let text = PRESETS.iter().find(|p| p.id == "simtank1").expect("a preset").text;
+    assert!(text.contains(from), "the preset holds {from}");
+    parse_rig("changed.toml", &text.replacen(from, to, 1)).map(|_| ())
+}
+
+fn refused(from: &str, to: &str) -> RigError {
+    match changed(from, to) {
+        Err(FileError::Rig { error, .. }) => error,
+        other => panic!("'{to}' in place of '{from}' gave {other:?}"),
+    }
+}
+
+fn field(error: &RigError) -> &str {
+    match error {
+        RigError::Value { field, .. } => field,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_place_or_width_that_is_no_number_crashed_the_drawing() {
+    let place = |text: &str| refused("at = [1.0, 1.0]", text);
+    for at in ["[nan, 1.0]", "[1.0, inf]", "[1e4, 1.0]"] {
+        assert_eq!(field(&place(&format!("at = {at}"))), "at");
+    }
+    for width in ["nan", "inf", "0.0", "-1.0", "1001.0"] {
+        assert_eq!(field(&place(&format!("width = {width}"))), "width");
+    }
+}
+
+#[test]
+fn sizes_without_bound_overflowed_in_the_plant() {
+    for value in ["1e-4", "3601.0", "nan", "inf"] {
+        assert_eq!(
+            field(&refused("sample_time_s = 0.5", &format!("sample_time_s = {value}"))),
+            "sample_time_s"
+        );
+    }
+    for (from, name) in [("area_cm2 = ", "area_cm2"), ("height_cm = ", "height_cm"), ("k90 = ", "k90")] {
+        assert_eq!(field(&refused(from, &format!("{from}1e10 # "))), name);
+    }
+    assert_eq!(field(&refused("curve = [[0.0, 0.0]", "curve = [[0.0, 2e9]")), "curve");
+}
+
+#[test]
+fn a_delay_of_nanoseconds_took_the_integrator_for_ever() {
+    assert_eq!(field(&refused("max = 100.0", "max = 100.0\ndelay_s = 1e-8")), "delay_s");
+}
+
+#[test]
+fn names_with_commas_quotes_and_blanks_broke_tables() {
+    for (from, quote) in
+        [("id = \"simtank1\"", "id"), ("signal = \"h1\"", "signal"), ("id = \"LIC-01\"", "id")]
+    {
+        for name in ["", "a b", "a,b", "a'b", "a;b", "a/b"] {
+            let error = refused(from, &format!("{quote} = \"{name}\""));
+            assert_eq!(error, RigError::Name { id: name.to_owned() });
+        }
+        assert!(matches!(refused(from, &format!("{quote} = \"a\\nb\"")), RigError::Name { .. }));
+    }
+    changed("signal = \"h1\"", "signal = \"Füllstand_1.ä-水\"").expect("letters of any script");
+}
+
+#[test]
+fn loops_and_configurations_of_one_name_hid_each_other() {
+    let text = PRESETS.iter().find(|p| p.id == "simtank2").expect("a preset").text;
+    let same = text.replace("id = \"LIC-02\"", "id = \"LIC-01\"");
+    let error = parse_rig("same.toml", &same).expect_err("two loops of one name");
+    assert!(matches!(error, FileError::Rig { error: RigError::Duplicate { id }, .. } if id == "LIC-01"));
+    let stad = PRESETS[0].text.replace("id = \"decoupled\"", "id = \"coupled\"");
+    let error = parse_rig("same.toml", &stad).expect_err("two configurations of one name");
+    assert!(matches!(error, FileError::Rig { error: RigError::Duplicate { id }, .. } if id == "coupled"));
+}
+
+#[test]
+fn valves_that_differ_in_capitals_shared_a_column() {
+    let text = PRESETS.iter().find(|p| p.id == "simtank2").expect("a preset").text;
+    let error =
+        parse_rig("same.toml", &text.replacen("id = \"V2\"", "id = \"v1\"", 1)).expect_err("V1 and v1");
+    assert!(matches!(error, FileError::Rig { error: RigError::Duplicate { id }, .. } if id == "v1"));
+}
+
+fn cannot_start(name: &str, text: &str) -> (String, CommandError) {
+    match parse_rig(name, text) {
+        Err(FileError::Start { configuration, error, .. }) => (configuration, error),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_rig_that_cannot_start_was_refused_only_after_the_old_one_was_gone() {
+    let simtank = PRESETS.iter().find(|p| p.id == "simtank1").expect("a preset").text;
+    let water = simtank.replacen("delta_cm", "water_cm3 = 1e9\nreservoir = \"TQ1\"\ndelta_cm", 1);
+    let (configuration, error) = cannot_start("water.toml", &water);
+    assert_eq!(configuration, "standard");
+    assert!(matches!(error, CommandError::Rig(RigError::Water { .. })), "{error}");
+    let bare = &water[..water.find("[[configuration]]").expect("configurations")];
+    assert_eq!(cannot_start("bare.toml", bare).0, "simtank1", "a rig without configurations");
+    // The second configuration of STAD: its loop cannot hold a level that high.
+    let at = PRESETS[0].text.find("id = \"decoupled\"").expect("a configuration");
+    let (first, second) = PRESETS[0].text.split_at(at);
+    let setpoint = second.lines().find(|l| l.starts_with("setpoint_cm")).expect("a setpoint");
+    let stad = format!("{first}{}", second.replacen(setpoint, "setpoint_cm = 26.9", 1));
+    let (configuration, error) = cannot_start("stad.toml", &stad);
+    assert_eq!(configuration, "decoupled");
+    assert!(matches!(error, CommandError::Rig(RigError::Unreachable { .. })), "{error}");
+}
+
+/// The program reads all presets when it starts.
+#[test]
+fn presets_are_read_before_anybody_notices() {
+    let start = std::time::Instant::now();
+    for preset in PRESETS {
+        parse_rig(preset.id, preset.text).expect("a preset");
+    }
+    println!("{:?}", start.elapsed());
+    assert!(start.elapsed().as_millis() < 200, "{:?}", start.elapsed());
+}
