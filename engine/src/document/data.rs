@@ -80,14 +80,17 @@ impl RigSettings {
         }
     }
 
-    /// Turns to a configuration; the operator's mode goes along.
+    /// Turns to a configuration; the operator's mode of each loop slot goes along.
     pub(super) fn configure(&mut self, configuration: usize) {
-        let mode = self.active_loops().first().and_then(|l| self.loops.get(&l.id)).map(|l| l.mode);
+        let tags = |settings: &Self| -> Vec<String> {
+            settings.active_loops().iter().map(|l| l.id.clone()).collect()
+        };
+        let modes: Vec<Option<Mode>> =
+            tags(self).iter().map(|tag| self.loops.get(tag).map(|l| l.mode)).collect();
         self.configuration = configuration;
         self.turn_valves();
-        let tags: Vec<String> = self.active_loops().iter().map(|l| l.id.clone()).collect();
-        for tag in tags {
-            if let (Some(mode), Some(settings)) = (mode, self.loops.get_mut(&tag)) {
+        for (tag, mode) in tags(self).iter().zip(modes) {
+            if let (Some(mode), Some(settings)) = (mode, self.loops.get_mut(tag)) {
                 settings.mode = mode;
             }
         }

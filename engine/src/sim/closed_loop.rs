@@ -77,7 +77,7 @@ impl ClosedLoop {
             network,
             channels,
         };
-        closed.loops = closed.make_loops(configuration, None);
+        closed.loops = closed.make_loops(configuration, &[]);
         closed
     }
 
@@ -179,16 +179,18 @@ impl ClosedLoop {
         }
     }
 
-    fn make_loops(&self, configuration: usize, mode: Option<Mode>) -> Vec<ActiveLoop> {
+    /// Loops of a configuration at the present outputs; `modes`, slot by slot, go before those of the settings.
+    fn make_loops(&self, configuration: usize, modes: &[Mode]) -> Vec<ActiveLoop> {
         let Some(settings) = self.settings.get(configuration) else { return Vec::new() };
         settings
             .iter()
-            .filter_map(|spec| {
+            .enumerate()
+            .filter_map(|(slot, spec)| {
                 let (sensor, pump) = (self.network.sensor(&spec.sensor)?, self.network.pump(&spec.pump)?);
                 let p = &self.network.pumps[pump];
                 let mv = self.source.plant().map_or(p.min, |plant| plant.inputs()[pump]);
                 let mut spec = spec.clone();
-                spec.mode = mode.unwrap_or(spec.mode);
+                spec.mode = modes.get(slot).copied().unwrap_or(spec.mode);
                 let control = ControlLoop::new(&spec, self.sample_time_s, p.min, p.max, mv);
                 Some(ActiveLoop { spec, sensor, pump, control, held: false })
             })
@@ -284,18 +286,18 @@ impl ClosedLoop {
     }
 
     /// Turns to another configuration: valves and delays move, the loops of that configuration take over
-    /// at the present output, in the mode the operator had chosen.
+    /// at the present output, each in the mode the operator had chosen for its slot.
     fn configure(&mut self, configuration: usize) -> Result<(), CommandError> {
         self.source.rig().ok_or(CommandError::NotARig)?.configure(configuration)?;
         if configuration == self.configuration {
             return Ok(());
         }
-        let mode = self.loops.first().map(|l| l.control.mode);
+        let modes: Vec<Mode> = self.loops.iter().map(|l| l.control.mode).collect();
         if let Some(kept) = self.settings.get_mut(self.configuration) {
             *kept = self.loops.iter().map(|l| l.spec.clone()).collect();
         }
         self.configuration = configuration;
-        self.loops = self.make_loops(configuration, mode);
+        self.loops = self.make_loops(configuration, &modes);
         Ok(())
     }
 
