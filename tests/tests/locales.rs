@@ -212,7 +212,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
     let scenario = vec![
         ScenarioError::Command { at_s: 3.0, error: refused() },
         ScenarioError::Command { at_s: 3.0, error: RigError::NoTank.into() },
-        ScenarioError::Duration { duration_s: -1.0, sample_time_s: 0.2 },
+        ScenarioError::Length { duration_s: -1.0 },
+        ScenarioError::Duration { duration_s: 1e9, sample_time_s: 0.2 },
     ];
     vec![
         ("RigError", boxed(RigError::samples())),

@@ -104,7 +104,13 @@ pub enum ScenarioError {
         /// What was refused.
         error: CommandError,
     },
-    /// A length that is negative, too long or not a number.
+    /// A length that is negative or not a number.
+    #[error("a run of {} s is not possible: the duration must be 0 s or more", number(*.duration_s))]
+    Length {
+        /// Length in seconds.
+        duration_s: f64,
+    },
+    /// A length of too many samples.
     #[error("a run of {} s with sample time {} s is not possible: at most 10⁸ samples", number(*.duration_s), number(*.sample_time_s))]
     Duration {
         /// Length in seconds.
@@ -118,6 +124,7 @@ impl Explain for ScenarioError {
     fn key(&self) -> &'static str {
         match self {
             Self::Command { .. } => "scenario.command",
+            Self::Length { .. } => "scenario.length",
             Self::Duration { .. } => "scenario.duration",
         }
     }
@@ -125,6 +132,7 @@ impl Explain for ScenarioError {
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::Command { at_s, error } => vec![("at_s", number(*at_s)), ("error", error.to_string())],
+            Self::Length { duration_s } => vec![("duration_s", number(*duration_s))],
             Self::Duration { duration_s, sample_time_s } => {
                 vec![("duration_s", number(*duration_s)), ("sample_time_s", number(*sample_time_s))]
             }
@@ -139,21 +147,27 @@ impl Explain for ScenarioError {
     }
 }
 
+/// Longest run in samples.
+const MOST_SAMPLES: f64 = 1e8;
+
 /// Runs a scenario on a rig from start to end.
 ///
 /// # Errors
-/// [`ScenarioError`] naming the time of the refused command.
+/// [`ScenarioError`] naming the time of the refused command, or the length that is not possible.
 pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, ScenarioError> {
+    let (duration_s, sample_time_s) = (scenario.duration_s, network.spec.sample_time_s);
+    if duration_s.is_nan() || duration_s < 0.0 {
+        return Err(ScenarioError::Length { duration_s });
+    }
+    let count = (duration_s / sample_time_s + 1e-9).floor();
+    if count > MOST_SAMPLES {
+        return Err(ScenarioError::Duration { duration_s, sample_time_s });
+    }
     let at = |at_s: f64| move |error: CommandError| ScenarioError::Command { at_s, error };
     let configuration = configuration_index(&network, scenario).map_err(at(0.0))?;
     let mut closed = ClosedLoop::simulated(network, configuration, scenario.measurement, scenario.seed)
         .map_err(at(0.0))?;
     set_start(&mut closed, &scenario.start).map_err(at(0.0))?;
-    let sample_time_s = closed.sample_time_s();
-    let count = (scenario.duration_s / sample_time_s + 1e-9).floor();
-    if !(0.0..=1e8).contains(&count) {
-        return Err(ScenarioError::Duration { duration_s: scenario.duration_s, sample_time_s });
-    }
     let mut events: Vec<&ScenarioEvent> = scenario.events.iter().collect();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let mut pending = events.into_iter().peekable();
