@@ -77,6 +77,7 @@ pub fn of_event(event: &Event) -> Entry {
             }
         }
         EventKind::SamplesLost { count } => (Weight::Alarm, tr!("event.samples_lost", count = count), None),
+        EventKind::EventsLost { count } => (Weight::Alarm, tr!("event.events_lost", count = count), None),
         EventKind::Stopped { reason } => (Weight::Alarm, tr!("event.stopped", reason = reason), None),
     };
     Entry { time_s: Some(event.time_s), weight, words, thread }

@@ -102,6 +102,11 @@ pub enum EventKind {
         /// How many.
         count: usize,
     },
+    /// Events nobody fetched were given up; sinks had them.
+    EventsLost {
+        /// How many.
+        count: usize,
+    },
     /// A defect of the program stopped the run; the last state is kept on screen.
     Stopped {
         /// What the program says of it.

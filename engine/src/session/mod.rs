@@ -13,6 +13,7 @@ mod worker;
 
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 
@@ -25,6 +26,9 @@ use crate::plant::{Measurement, Network};
 use crate::signal::SampleBlock;
 use crate::sim::ClosedLoop;
 use worker::{Ports, Worker};
+
+/// Longest wait for the worker to end, when its session is dropped.
+const LONGEST_FAREWELL: Duration = Duration::from_secs(2);
 
 /// Called from the worker's thread whenever there is something new to fetch.
 pub type Notify = Box<dyn Fn() + Send>;
@@ -143,8 +147,14 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        let asked = self.commands.send_timeout(SessionCommand::Shutdown, std::time::Duration::from_secs(1));
-        if let (Ok(()), Some(worker)) = (asked, self.worker.take()) {
+        let asked = self.commands.send_timeout(SessionCommand::Shutdown, Duration::from_secs(1));
+        let (Ok(()), Some(worker)) = (asked, self.worker.take()) else { return };
+        let asked_at = Instant::now();
+        // A worker that a sink or a long computation holds up is left to end by itself.
+        while !worker.is_finished() && asked_at.elapsed() < LONGEST_FAREWELL {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if worker.is_finished() {
             drop(worker.join());
         }
     }

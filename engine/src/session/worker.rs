@@ -37,6 +37,7 @@ pub(super) struct Worker {
     fresh: SampleBlock,
     pending: SampleBlock,
     pending_events: Vec<Event>,
+    lost_events: usize,
     sinks: Vec<(u64, Box<dyn Sink>)>,
     commands: Receiver<SessionCommand>,
     blocks: Sender<SampleBlock>,
@@ -70,6 +71,7 @@ impl Worker {
             fresh: empty.clone(),
             pending: empty,
             pending_events: vec![],
+            lost_events: 0,
             sinks: vec![],
             commands: ports.commands,
             blocks: ports.blocks,
@@ -146,17 +148,14 @@ impl Worker {
     /// One sample; false when a defect stopped the run.
     fn sample(&mut self) -> bool {
         let time_s = self.closed.time_s();
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let outcome = guarded(|| {
             let row = self.closed.step();
             self.fresh.time_s.push(time_s);
             self.fresh.values.extend_from_slice(row);
-        }));
+        });
         self.changed = true;
-        if let Err(panic) = outcome {
-            let reason = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
-            let reason = reason.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            self.running = false;
-            self.say(EventKind::Stopped { reason });
+        if let Err(reason) = outcome {
+            self.stop(reason);
             return false;
         }
         let mut changes = Vec::new();
@@ -176,7 +175,9 @@ impl Worker {
                 return false;
             }
             self.changed = true;
-            self.obey(command);
+            if let Err(reason) = guarded(|| self.obey(command)) {
+                self.stop(reason);
+            }
             // A flood of commands must not keep time from passing.
             next = if begun.elapsed() < BUDGET { self.commands.try_recv().ok() } else { None };
         }
@@ -212,6 +213,8 @@ impl Worker {
             }
             SessionCommand::Load(rig) => self.load(&rig),
             SessionCommand::Attach { id, mut sink } => {
+                // What was sampled before belongs to the others.
+                self.hand_to_sinks();
                 sink.started(self.run, self.closed.network(), self.closed.channels());
                 self.sinks.push((id, sink));
             }
@@ -221,6 +224,14 @@ impl Worker {
             }
             SessionCommand::Shutdown => {}
         }
+    }
+
+    /// Stops the run after a defect of the program.
+    fn stop(&mut self, reason: String) {
+        self.running = false;
+        self.owed_s = 0.0;
+        self.achieved_speed = f64::NAN;
+        self.say(EventKind::Stopped { reason });
     }
 
     fn set_running(&mut self, running: bool) {
@@ -249,9 +260,9 @@ impl Worker {
                 };
                 self.fresh = empty.clone();
                 self.pending = empty;
-                for (_, sink) in &mut self.sinks {
-                    sink.started(self.run, self.closed.network(), self.closed.channels());
-                }
+                let (network, channels) = (self.closed.network().clone(), self.closed.channels().clone());
+                let run = self.run;
+                self.tell_sinks(|sink| sink.started(run, &network, &channels));
                 self.say(EventKind::RigLoaded { id: rig.network.spec.id.clone() });
             }
             Err(error) => self.say(EventKind::Refused(error)),
@@ -260,24 +271,47 @@ impl Worker {
 
     fn say(&mut self, kind: EventKind) {
         let event = Event { run: self.run, time_s: self.closed.time_s(), kind };
-        for (_, sink) in &mut self.sinks {
-            sink.event(&event);
-        }
+        let told = event.clone();
         if self.pending_events.len() < MOST_EVENTS {
             self.pending_events.push(event);
+        } else {
+            self.lost_events += 1;
         }
         self.changed = true;
+        self.tell_sinks(|sink| sink.event(&told));
+    }
+
+    /// Calls every sink; one that panics is let go, and the run stops.
+    fn tell_sinks(&mut self, mut tell: impl FnMut(&mut dyn Sink)) {
+        let mut reasons = Vec::new();
+        let mut index = 0;
+        while let Some((_, sink)) = self.sinks.get_mut(index) {
+            match guarded(|| tell(&mut **sink)) {
+                Ok(()) => index += 1,
+                Err(reason) => {
+                    reasons.push(reason);
+                    let (_, broken) = self.sinks.remove(index);
+                    reasons.extend(guarded(|| drop(broken)).err());
+                }
+            }
+        }
+        for reason in reasons {
+            self.stop(reason);
+        }
     }
 
     fn hand_to_sinks(&mut self) {
         if self.fresh.time_s.is_empty() {
             return;
         }
-        for (_, sink) in &mut self.sinks {
-            sink.samples(&self.fresh);
-        }
-        self.pending.time_s.append(&mut self.fresh.time_s);
-        self.pending.values.append(&mut self.fresh.values);
+        let channels = self.fresh.channels.clone();
+        let empty = SampleBlock { run: self.fresh.run, channels, time_s: vec![], values: vec![] };
+        let mut fresh = std::mem::replace(&mut self.fresh, empty);
+        self.tell_sinks(|sink| sink.samples(&fresh));
+        self.pending.time_s.append(&mut fresh.time_s);
+        self.pending.values.append(&mut fresh.values);
+        // Its room serves the next samples.
+        self.fresh = fresh;
     }
 
     /// Hands samples to the sinks, offers them and the events to the reader, publishes the snapshot.
@@ -309,13 +343,19 @@ impl Worker {
             }
         }
         self.pending_events.extend(events);
+        if self.lost_events > 0 && self.pending_events.len() < MOST_EVENTS {
+            // The sinks had every event: this is for the reader alone.
+            let kind = EventKind::EventsLost { count: std::mem::take(&mut self.lost_events) };
+            self.pending_events.push(Event { run: self.run, time_s: self.closed.time_s(), kind });
+        }
         if self.changed {
             self.changed = false;
             let snapshot = Arc::new(self.snapshot());
             if let Ok(mut latest) = self.latest.lock() {
                 *latest = snapshot;
             }
-            (self.notify)();
+            // The listener's defects are its own.
+            drop(guarded(|| (self.notify)()));
         }
     }
 
@@ -346,6 +386,14 @@ impl Worker {
             alarms: self.alarms.active(),
         }
     }
+}
+
+/// Runs something whose panic must not end the worker; gives what the panic says.
+fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let said = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
+        said.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
+    })
 }
 
 fn loop_now(l: &crate::sim::ActiveLoop, closed: &ClosedLoop) -> LoopNow {

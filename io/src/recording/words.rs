@@ -17,6 +17,7 @@ pub(super) fn line(kind: &EventKind) -> (&'static str, String) {
         EventKind::Alarm(alarm, true) => (warning, format!("alarm: {}", state(alarm))),
         EventKind::Alarm(alarm, false) => (info, format!("over: {}", state(alarm))),
         EventKind::SamplesLost { count } => (warning, format!("{count} samples given up")),
+        EventKind::EventsLost { count } => (warning, format!("{count} events given up")),
         EventKind::Stopped { reason } => (TextLogLevel::ERROR, format!("stopped by a defect: {reason}")),
     }
 }
