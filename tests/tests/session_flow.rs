@@ -1,13 +1,20 @@
 //! The session under everything a face can send.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use rand::{Rng, RngExt, SeedableRng};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
-use vasos_engine::plant::{Measurement, Network};
-use vasos_engine::session::{CommandError, Event, EventKind, Rig, RigCommand, Session, SessionCommand};
-use vasos_engine::sim::ClosedLoop;
+use vasos_engine::document::{Document, DocumentCommand};
+use vasos_engine::plant::spec::ValveLaw;
+use vasos_engine::plant::{Measurement, Network, RigSpec};
+use vasos_engine::session::{
+    Alarm, CommandError, Event, EventKind, Rig, RigCommand, Session, SessionCommand, Sink,
+};
+use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
+use vasos_engine::sim::{ClosedLoop, Scenario, ScenarioError, check_starts, run_scenario};
 use vasos_io::rig::{PRESETS, preset};
 
 fn rig(id: &str) -> Rig {
@@ -67,8 +74,8 @@ fn it_starts_at_rest_and_runs_at_the_speed_it_is_told() {
         }
         rows as u64 == session.snapshot().samples
     });
-    assert!(session.send(SessionCommand::Step));
     let before = session.snapshot().samples;
+    assert!(session.send(SessionCommand::Step));
     wait("one step", || session.snapshot().samples == before + 1);
 }
 
@@ -132,17 +139,241 @@ fn manual_and_back_and_coupled_to_decoupled_bring_no_bump() {
     assert_eq!(closed.loops()[0].spec.id, "LIC-03");
 }
 
+/// A sink that does what it is told to at its first event after the start.
+struct Scripted<F: FnMut() + Send>(F);
+
+impl<F: FnMut() + Send> Sink for Scripted<F> {
+    fn started(&mut self, _: u64, _: &Arc<Network>, _: &Arc<ChannelSet>) {}
+    fn samples(&mut self, _: &SampleBlock) {}
+    fn event(&mut self, _: &Event) {
+        (self.0)();
+    }
+}
+
+#[test]
+fn a_sink_that_panicked_took_the_worker_with_it() {
+    let session = start("stad");
+    let sink = Box::new(Scripted(|| panic!("a defect of the sink")));
+    assert!(session.send(SessionCommand::Attach { id: 1, sink }));
+    assert!(session.send(SessionCommand::Run));
+    let mut reasons = vec![];
+    wait("the defect to be said", || {
+        reasons.extend(events(&session).into_iter().filter_map(|e| match e.kind {
+            EventKind::Stopped { reason } => Some(reason),
+            _ => None,
+        }));
+        !reasons.is_empty()
+    });
+    assert_eq!(reasons, ["a defect of the sink"]);
+    wait("the run to stop", || !session.snapshot().running);
+    assert!(session.send(SessionCommand::Speed(1000.0)) && session.send(SessionCommand::Run));
+    wait("time to go on without that sink", || session.snapshot().time_s > 10.0);
+}
+
+/// Pumps and sensors that a file can name but that are not there: `Load` panics on such a network.
+#[test]
+fn a_rig_that_panicked_at_its_load_took_the_worker_with_it() {
+    let session = start("stad");
+    let mut broken = Network::clone(&preset("stad").expect("preset"));
+    broken.pumps.clear();
+    let network = Arc::new(broken);
+    assert!(session.send(SessionCommand::Load(Box::new(Rig { network, ..rig("stad") }))));
+    wait("the defect to be said", || {
+        events(&session).iter().any(|e| matches!(e.kind, EventKind::Stopped { .. }))
+    });
+    assert!(session.send(SessionCommand::Load(Box::new(rig("simtank1")))));
+    wait("the next rig", || session.snapshot().network.spec.id == "simtank1");
+}
+
+#[test]
+fn events_nobody_fetched_vanished_without_a_word() {
+    let session = start("stad");
+    let total = 20_000;
+    for i in 0..total {
+        let level_cm = f64::from(i % 20);
+        let command = || RigCommand::Setpoint { tag: "LIC-02".to_owned(), level_cm };
+        wait("room for a command", || session.send(SessionCommand::Rig(command())));
+    }
+    let (mut done, mut lost) = (0, 0);
+    wait("every event to be there or counted", || {
+        for event in session.events() {
+            match event.kind {
+                EventKind::Done(_) => done += 1,
+                EventKind::EventsLost { count } => lost += count,
+                _ => {}
+            }
+        }
+        done + lost == total as usize
+    });
+    assert!(lost > 0, "{done} events were kept");
+}
+
+#[test]
+fn a_sink_that_hung_kept_the_program_from_ending() {
+    let session = start("stad");
+    let (release, held) = crossbeam_channel::bounded::<()>(0);
+    let sink = Box::new(Scripted(move || assert!(held.recv().is_err(), "nobody sends")));
+    assert!(session.send(SessionCommand::Attach { id: 1, sink }) && session.send(SessionCommand::Run));
+    std::thread::sleep(Duration::from_millis(100));
+    let begun = Instant::now();
+    drop(session);
+    assert!(begun.elapsed() < Duration::from_secs(4), "{:?}", begun.elapsed());
+    drop(release);
+}
+
+/// Level at the lower end of the sensor's range: each sample falls on either side.
+#[test]
+fn noise_at_the_end_of_the_range_made_the_alarms_flicker() {
+    let session = start("stad");
+    // 3.8 mA of a transmitter with 4 mA at 1.5 cm and 20 mA at 25.5 cm.
+    let limit = 1.2;
+    let valve = |tag: &str| RigCommand::Valve { tag: tag.to_owned(), angle_deg: 0.0 };
+    send(&session, RigCommand::Mode { tag: "LIC-02".to_owned(), mode: Mode::Manual });
+    send(&session, RigCommand::Mv { tag: "LIC-02".to_owned(), value: 0.0 });
+    for tag in ["FV01", "FV02", "FV03"] {
+        send(&session, valve(tag));
+    }
+    let level_cm = session.snapshot().tanks[1].level_cm;
+    send(&session, RigCommand::Bump { tag: "TQ2".to_owned(), delta_cm: limit - level_cm });
+    for _ in 0..3000 {
+        assert!(session.send(SessionCommand::Step));
+    }
+    let (mut alarms, mut below, mut rows) = (0, 0, 0);
+    wait("the samples", || {
+        for event in session.events() {
+            alarms += usize::from(matches!(event.kind, EventKind::Alarm(Alarm::BelowRange { .. }, _)));
+        }
+        for block in session.samples() {
+            let pv = block.channels.column(ChannelKind::Pv(0)).expect("a PV");
+            below += block.column(pv).filter(|&pv| pv < limit + 0.01).count();
+            rows += block.time_s.len();
+        }
+        rows == 3000
+    });
+    println!("{below} of {rows} samples below the range, {alarms} changes of the alarm");
+    assert!((500..2500).contains(&below), "the level lies at the limit: {below} samples below");
+    assert!(alarms < 20, "{alarms} changes");
+    send(&session, RigCommand::Bump { tag: "TQ2".to_owned(), delta_cm: -1.0 });
+    for _ in 0..10 {
+        assert!(session.send(SessionCommand::Step));
+    }
+    let below = Alarm::BelowRange { tag: "LT02".to_owned() };
+    wait("the alarm after two seconds below", || session.snapshot().alarms.contains(&below));
+}
+
+/// Two loops in each of two configurations.
+fn twice(id: &str) -> Arc<Network> {
+    let mut spec = preset(id).expect("preset").spec.clone();
+    let mut second = spec.configurations[0].clone();
+    second.id = "second".to_owned();
+    for l in &mut second.loops {
+        l.id.push('b');
+    }
+    spec.configurations.push(second);
+    Arc::new(Network::new(spec).expect("valid"))
+}
+
+#[test]
+fn a_turn_of_the_rig_put_every_loop_in_the_mode_of_the_first() {
+    let network = twice("simtank2");
+    let manual = || RigCommand::Mode { tag: "LIC-02".to_owned(), mode: Mode::Manual };
+    let mut closed = ClosedLoop::simulated(network.clone(), 0, Measurement::IDEAL, 1).expect("starts");
+    closed.apply(&manual()).expect("manual");
+    closed.apply(&RigCommand::Configuration { id: "second".to_owned() }).expect("turns");
+    let modes: Vec<Mode> = closed.loops().iter().map(|l| l.control.mode).collect();
+    assert_eq!(modes, [Mode::Automatic, Mode::Manual]);
+    let document = Document::new(network);
+    let document = document.after(&DocumentCommand::Mode("LIC-02".to_owned(), Mode::Manual)).expect("manual");
+    let document = document.after(&DocumentCommand::Configuration(1)).expect("turns");
+    let modes = ["LIC-01b", "LIC-02b"].map(|tag| document.rig.loops[tag].mode);
+    assert_eq!(modes, [Mode::Automatic, Mode::Manual], "the document agrees with the session");
+}
+
+#[test]
+fn a_run_of_negative_length_was_called_too_long() {
+    let run = |duration: &str| {
+        let text = format!("schema = 1\nrig = \"stad\"\nduration_s = {duration}\n");
+        let scenario: Scenario = toml::from_str(&text).expect("a scenario");
+        run_scenario(preset("stad").expect("preset"), &scenario).map(|run| run.time_s.len())
+    };
+    for duration in ["-1.0", "-1e-12", "nan", "-inf"] {
+        assert!(matches!(run(duration), Err(ScenarioError::Length { .. })), "{duration}");
+    }
+    for duration in ["1e9", "inf"] {
+        assert!(matches!(run(duration), Err(ScenarioError::Duration { .. })), "{duration}");
+    }
+    assert_eq!(run("0.0"), Ok(1));
+}
+
+/// Rigs at the edge of what a file may say.
+fn odd_rigs() -> Vec<Rig> {
+    let odd = |id: &str, change: fn(&mut RigSpec)| {
+        let mut spec = preset(id).expect("preset").spec.clone();
+        spec.sample_time_s = 0.05;
+        change(&mut spec);
+        let network = Arc::new(Network::new(spec).expect("valid"));
+        check_starts(&network).expect("starts");
+        Rig { network, ..rig(id) }
+    };
+    vec![
+        odd("stad", |spec| spec.configurations.clear()),
+        odd("simtank1", |spec| {
+            spec.tanks[0].area_cm2 = 1e-3;
+            spec.tanks[0].height_cm = 1e-2;
+            spec.configurations[0].loops[0].setpoint_cm = 5e-3;
+        }),
+        odd("simtank3", |spec| spec.delta_cm = 0.0),
+        odd("simtank2", |spec| spec.valves.iter_mut().for_each(|v| v.law = ValveLaw::Laminar)),
+        odd("stad", |spec| {
+            spec.pumps[0].delay_s = 0.0;
+            spec.configurations.iter_mut().for_each(|c| c.delays_s.clear());
+        }),
+        odd("simtank1", |spec| {
+            spec.pumps.clear();
+            spec.sensors.clear();
+            spec.configurations.clear();
+        }),
+    ]
+}
+
+/// What a sink of the random test has seen.
+#[derive(Default)]
+struct Seen {
+    starts: AtomicU64,
+    rows: AtomicU64,
+    events: AtomicU64,
+}
+
+struct Counting(Arc<Seen>);
+
+impl Sink for Counting {
+    fn started(&mut self, _: u64, _: &Arc<Network>, _: &Arc<ChannelSet>) {
+        self.0.starts.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn samples(&mut self, block: &SampleBlock) {
+        assert_eq!(block.values.len(), block.time_s.len() * block.channels.len());
+        self.0.rows.fetch_add(block.time_s.len() as u64, Ordering::Relaxed);
+    }
+
+    fn event(&mut self, _: &Event) {
+        self.0.events.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
 /// The issue: the worker survives anything the UI can send, for 10⁵ steps, and never blocks it.
 #[test]
 fn the_worker_survives_a_hundred_thousand_steps_of_random_commands() {
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(20_261_122);
     let session = Session::start(&fast("stad"), Box::new(|| ())).expect("starts");
+    let (odd, seen) = (odd_rigs(), Arc::new(Seen::default()));
+    let mut loaded = BTreeSet::new();
     let mut slowest = Duration::ZERO;
     let (mut steps, mut sent) = (0_u64, 0_u64);
     assert!(session.send(SessionCommand::Speed(1000.0)) && session.send(SessionCommand::Run));
     let started = Instant::now();
     while steps < 100_000 {
-        let command = random_command(&mut rng);
+        let command = random_command(&mut rng, &odd, &seen);
         let begun = Instant::now();
         let taken = session.send(command);
         slowest = slowest.max(begun.elapsed());
@@ -153,6 +384,9 @@ fn the_worker_survives_a_hundred_thousand_steps_of_random_commands() {
         }
         for event in session.events() {
             assert!(!matches!(event.kind, EventKind::Stopped { .. }), "{event:?}");
+            if let EventKind::RigLoaded { id } = event.kind {
+                loaded.insert(id);
+            }
         }
         let snapshot = session.snapshot();
         for (tank, now) in snapshot.network.tanks.iter().zip(&snapshot.tanks) {
@@ -162,13 +396,17 @@ fn the_worker_survives_a_hundred_thousand_steps_of_random_commands() {
         std::thread::sleep(Duration::from_micros(300));
         assert!(started.elapsed() < Duration::from_secs(120), "{steps} steps after two minutes");
     }
-    println!("{steps} steps, {sent} commands, slowest send {slowest:?}");
+    let count = |of: &AtomicU64| of.load(Ordering::Relaxed);
+    let (starts, rows, told) = (count(&seen.starts), count(&seen.rows), count(&seen.events));
+    println!("{steps} steps, {sent} commands, slowest send {slowest:?}, {loaded:?}");
+    println!("sinks: {starts} starts, {rows} rows, {told} events");
+    assert!(starts > 10 && rows > 10_000 && told > 1000, "the sinks took part");
     assert!(slowest < Duration::from_millis(50), "a send took {slowest:?}");
     assert!(session.send(SessionCommand::Load(Box::new(rig("stad")))));
     wait("a fresh run after all that", || session.snapshot().time_s < 1000.0);
 }
 
-fn random_command(rng: &mut impl Rng) -> SessionCommand {
+fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> SessionCommand {
     let odd = [f64::NAN, f64::INFINITY, -1e300, -5.0, 0.0, 1e-300, 1.0, 3.3, 15.0, 26.9, 45.0, 90.0, 1e9];
     let value =
         if rng.random_bool(0.3) { odd[rng.random_range(0..odd.len())] } else { rng.random_range(0.0..30.0) };
@@ -178,7 +416,7 @@ fn random_command(rng: &mut impl Rng) -> SessionCommand {
     };
     let loops = ["LIC-02", "LIC-03", "LIC-01", "BA01", "", "TQ1"];
     let gains = PidGains { kc: value, ti_s: 20.0 * value, td_s: value / 9.0, n: 10.0 };
-    match rng.random_range(0..32) {
+    match rng.random_range(0..36) {
         0 => SessionCommand::Run,
         1 if rng.random_bool(0.2) => SessionCommand::Pause,
         2 if rng.random_bool(0.1) => SessionCommand::Step,
@@ -216,6 +454,11 @@ fn random_command(rng: &mut impl Rng) -> SessionCommand {
                 resolution: rng.random_bool(0.5),
             },
         }),
+        32 => SessionCommand::Attach { id: rng.random_range(0..4), sink: Box::new(Counting(seen.clone())) },
+        33 | 34 => SessionCommand::Detach { id: rng.random_range(0..4) },
+        35 if rng.random_bool(0.1) => {
+            SessionCommand::Load(Box::new(rigs[rng.random_range(0..rigs.len())].clone()))
+        }
         30 => SessionCommand::Rig(RigCommand::Seed { seed: rng.random() }),
         _ => SessionCommand::Run,
     }
