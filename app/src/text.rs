@@ -53,6 +53,7 @@ pub fn cell(value: f64) -> String {
 pub fn quotient(over: &str, under: &str) -> String {
     let known = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
     match (over, under) {
+        (a, b) if a == b && !a.is_empty() => "1".to_owned(),
         ("cm³/s", "cm") => "cm²/s".to_owned(),
         ("cm", "cm³/s") => "s/cm²".to_owned(),
         (_, u) if u.contains(['/', '·']) => format!("{}/({u})", known(over)),

@@ -106,7 +106,8 @@ fn curves(
     // Responses to a unit step: PV per PV (or per MV), MV per PV (or per MV).
     let per = if load { mv_unit } else { pv_unit };
     let of = if is_pv { pv_unit } else { mv_unit };
-    let unit = if of.is_empty() || per.is_empty() { String::new() } else { format!(" [{of}/{per}]") };
+    let known = !of.is_empty() && !per.is_empty();
+    let unit = if known { format!(" [{}]", text::quotient(of, per)) } else { String::new() };
     let mut plot = Plot::new(if is_pv { "step_y" } else { "step_u" })
         .height(height.max(50.0))
         .allow_scroll(false)

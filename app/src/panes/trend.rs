@@ -178,7 +178,7 @@ fn legend(ui: &mut egui::Ui, content: &Content) {
         for curve in content.upper.iter().chain(&content.lower) {
             let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
             ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.0, curve.colour));
-            ui.label(egui::RichText::new(&curve.name).size(theme::SMALL));
+            ui.add(egui::Label::new(egui::RichText::new(&curve.name).size(theme::SMALL)).extend());
             ui.add_space(theme::GAP);
         }
     });

@@ -134,8 +134,8 @@ fn tank(painter: &Painter, view: &TankView, p: &Palette, phase: f32) {
     );
     let reading = format!("{} cm", text::fixed(view.level_cm, 1));
     // In a narrow tank the reading goes under the tag, clear of the stream that falls in.
-    let narrow = view.rect.width() < 110.0;
-    let (at, anchor) = if narrow {
+    let below = view.fed_on_the_right || view.rect.width() < 110.0;
+    let (at, anchor) = if below {
         (view.rect.left_top() + vec2(9.0, 19.0), Align2::LEFT_TOP)
     } else {
         (view.rect.right_top() + vec2(-6.0, 3.0), Align2::RIGHT_TOP)
