@@ -1,7 +1,7 @@
 //! Min/max pyramid: draws any stretch of a long signal with as many points as there are pixels.
 
 /// Points of level k that make one of level k + 1.
-const FAN: usize = 8;
+const FAN: usize = 4;
 
 /// Extremes of a stretch of samples, in the order in which they came.
 #[derive(Debug, Clone, Copy, PartialEq)]
