@@ -39,11 +39,21 @@ pub fn rough(value: f64) -> String {
     fixed(value, (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize)
 }
 
+/// A number for a narrow cell: three significant digits, powers of ten below 0.01 and above 9999.
+#[must_use]
+pub fn cell(value: f64) -> String {
+    if value.is_finite() && value != 0.0 && !(0.01..10_000.0).contains(&value.abs()) {
+        return format!("{value:.0e}").replace('-', "−");
+    }
+    brief(value)
+}
+
 /// The unit of a quotient of two, written the short way where there is one.
 #[must_use]
 pub fn quotient(over: &str, under: &str) -> String {
     let known = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
     match (over, under) {
+        (a, b) if a == b && !a.is_empty() => "1".to_owned(),
         ("cm³/s", "cm") => "cm²/s".to_owned(),
         ("cm", "cm³/s") => "s/cm²".to_owned(),
         (_, u) if u.contains(['/', '·']) => format!("{}/({u})", known(over)),
@@ -86,6 +96,10 @@ mod tests {
         assert_eq!(brief(152.04), "152");
         assert_eq!(brief(4.987), "4.99");
         assert_eq!(brief(0.031_26), "0.0313");
+        assert_eq!(cell(0.005_96), "6e−3");
+        assert_eq!(quotient("cm³/s", "cm"), "cm²/s");
+        assert_eq!(quotient("V", "ml/s"), "V/(ml/s)");
+        assert_eq!(rough(0.002_17), "0.0022");
         assert_eq!(clock(3725.9), "1:02:05");
         assert_eq!(clock(59.99), "00:59");
     }

@@ -232,7 +232,7 @@ fn visuals(theme: egui::Theme, p: &Palette) -> egui::Visuals {
         (&mut widgets.noninteractive, p.pane, p.edge, p.text),
         (&mut widgets.inactive, p.button, p.edge, p.text),
         (&mut widgets.hovered, p.button_hover, p.weak, p.text),
-        (&mut widgets.active, p.accent, p.accent, p.on_accent),
+        (&mut widgets.active, p.button_hover, p.accent_text, p.text),
         (&mut widgets.open, p.button_hover, p.edge, p.text),
     ] {
         state.bg_fill = fill;

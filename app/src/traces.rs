@@ -17,6 +17,8 @@ pub struct RunTrace {
     pub columns: Vec<Pyramid>,
     /// Marks of what happened.
     pub marks: Vec<Mark>,
+    /// Times in seconds at which another configuration took over.
+    changes_s: Vec<f64>,
 }
 
 /// Something that happened, at its time.
@@ -28,6 +30,8 @@ pub struct Mark {
     pub words: String,
 }
 
+/// Rows kept of a run: 55 hours at 200 ms. The oldest quarter goes when there are more; a recording has them all.
+const MOST_ROWS: usize = 1_000_000;
 /// Marks kept; a drag gives one a frame.
 const MOST_MARKS: usize = 400;
 
@@ -36,12 +40,17 @@ impl RunTrace {
     pub fn take(&mut self, block: &SampleBlock) {
         let other = self.channels.as_ref().is_none_or(|c| !Arc::ptr_eq(c, &block.channels));
         if other || block.run != self.run {
-            let marks = if block.run == self.run { std::mem::take(&mut self.marks) } else { vec![] };
+            let (marks, changes_s) = if block.run == self.run {
+                (std::mem::take(&mut self.marks), std::mem::take(&mut self.changes_s))
+            } else {
+                (vec![], vec![])
+            };
             *self = Self {
                 run: block.run,
                 channels: Some(block.channels.clone()),
                 columns: vec![Pyramid::default(); block.channels.len()],
                 marks,
+                changes_s,
             };
         }
         for (i, &time_s) in block.time_s.iter().enumerate() {
@@ -49,12 +58,16 @@ impl RunTrace {
                 column.push(time_s, value);
             }
         }
+        if self.columns.first().is_some_and(|c| c.len() > MOST_ROWS) {
+            self.columns.iter_mut().for_each(|c| c.keep_last(MOST_ROWS / 4 * 3));
+        }
     }
 
     /// Takes note of an event that belongs on the time axis.
     pub fn note(&mut self, event: &Event) {
         if event.run != self.run {
             self.marks.clear();
+            self.changes_s.clear();
             self.run = event.run;
             self.columns.iter_mut().for_each(Pyramid::clear);
         }
@@ -65,7 +78,10 @@ impl RunTrace {
             EventKind::Done(RigCommand::Bump { tag, delta_cm }) => {
                 format!("{tag} {} cm", crate::text::fixed(*delta_cm, 1))
             }
-            EventKind::Done(RigCommand::Configuration { id }) => id.clone(),
+            EventKind::Done(RigCommand::Configuration { id }) => {
+                self.changes_s.push(event.time_s);
+                id.clone()
+            }
             EventKind::Done(RigCommand::Tuning { tag, tuning }) => {
                 format!("{tag} Kc {}", crate::text::brief(tuning.gains.kc))
             }
@@ -89,6 +105,12 @@ impl RunTrace {
     #[must_use]
     pub fn column(&self, kind: ChannelKind) -> Option<&Pyramid> {
         self.columns.get(self.channels.as_ref()?.column(kind)?)
+    }
+
+    /// When the last change of configuration before a time was, in seconds.
+    #[must_use]
+    pub fn last_change_s(&self, before_s: f64) -> Option<f64> {
+        self.changes_s.iter().copied().rfind(|&s| s < before_s)
     }
 
     /// Time of the last sample in seconds.

@@ -127,9 +127,20 @@ impl TuningTable {
     }
 }
 
+/// Whether a model is in the units of the loop in view: cm, and the unit of its pump.
+#[must_use]
+pub fn same_units(document: &Document, entry: &ModelEntry, focus: usize) -> bool {
+    let spec = &document.rig.network.spec;
+    let pump =
+        document.rig.active_loops().get(focus).and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump));
+    pump.is_some_and(|p| entry.pv_unit == "cm" && entry.mv_unit == p.unit.symbol())
+}
+
 fn key(document: &Document, entry: &ModelEntry, focus: usize) -> Key {
     let tag = document.rig.active_loops().get(focus).map(|l| l.id.clone());
     let present = tag.and_then(|t| document.rig.loops.get(&t)).map(|l| l.tuning.gains);
+    // Gains in other units than the model's say nothing on it.
+    let present = present.filter(|_| same_units(document, entry, focus));
     Key {
         number: entry.number,
         model: entry.model.clone(),

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use vasos_app::action::Action;
+use vasos_app::i18n::Language;
 use vasos_app::panes::PaneKind;
 use vasos_app::panes::pid::layout::Layout;
 use vasos_app::panes::pid::model::PidModel;
@@ -65,6 +66,7 @@ fn model_command() -> DocumentCommand {
         model: ProcessModel::Fopdt(Fopdt::new(4.9, 152.0, 2.0).expect("usable")),
         origin: ModelOrigin::Typed,
         fit: None,
+        rows: None,
         pv_unit: "cm".to_owned(),
         mv_unit: "V".to_owned(),
     }))
@@ -313,6 +315,48 @@ fn the_window_looks_as_it_did() {
             results.extend_harness(&mut harness);
         }
     }
+}
+
+/// Other rigs, the other language, a log and its sheet.
+#[test]
+fn other_rigs_languages_and_logs_look_as_they_did() {
+    let mut results = egui_kittest::SnapshotResults::new();
+    let small = [1280.0, 720.0];
+    for (id, size) in [("simtank1", small), ("simtank2", [1440.0, 900.0]), ("simtank3", small)] {
+        let mut harness = window(size);
+        act(&mut harness, Action::Language(Language::Portuguese));
+        act(&mut harness, Action::OpenPreset(id));
+        send(&mut harness, 120);
+        wait(&mut harness, id, |w| w.snapshot().samples == 120 && w.run().end_s() > 59.0);
+        harness.remove_cursor();
+        picture(&mut harness, id);
+        results.extend_harness(&mut harness);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("heater.csv");
+    let mut text = "time [s];reactor temperature [degC];setpoint [degC];heater power [kW]\n".to_owned();
+    for i in 0..600 {
+        let t = f64::from(i);
+        let y = 20.0 + if t > 72.0 { 30.0 * (1.0 - (-(t - 72.0) / 90.0).exp()) } else { 0.0 };
+        let u = if t < 60.0 { 1.5 } else { 4.5 };
+        text.push_str(&format!("{t};{:.3};50;{u}\n", y + 0.1 * (t * 12.9898).sin()));
+    }
+    text.push_str("600;Bad;50;4.5\n");
+    std::fs::write(&path, text).expect("written");
+    let mut harness = window(small);
+    act(&mut harness, Action::ToggleTheme);
+    drop_on(&mut harness, path);
+    wait(&mut harness, "the import", |w| !w.is_busy());
+    harness.run_steps(3);
+    picture(&mut harness, "import_sheet");
+    harness.get_by_label("Use this log").click();
+    wait(&mut harness, "the log", |w| w.document().log.is_some());
+    act(&mut harness, Action::Identify);
+    wait(&mut harness, "a model", |w| w.document().model().is_some());
+    harness.remove_cursor();
+    harness.run_steps(3);
+    picture(&mut harness, "log_identified");
+    results.extend_harness(&mut harness);
 }
 
 fn picture(harness: &mut Window, name: &str) {

@@ -39,14 +39,18 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
 }
 
 fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, actions: &mut Vec<Action>) {
-    if view.snapshot.loops.len() > 1 {
-        let tags: Vec<String> = view.snapshot.loops.iter().map(|l| l.tag.clone()).collect();
-        if let Some(chosen) = segmented(ui, &tr!("faceplate.loop"), &tags, state.shown) {
-            state.shown = chosen;
-        }
-    }
     ui.horizontal(|ui| {
-        ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
+        if view.snapshot.loops.len() > 1 {
+            let combo = egui::ComboBox::from_id_salt("loop").width(78.0).selected_text(&now.tag);
+            let combo = combo.show_ui(ui, |ui| {
+                for (i, other) in view.snapshot.loops.iter().enumerate() {
+                    ui.selectable_value(&mut state.shown, i, &other.tag);
+                }
+            });
+            combo.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, tr!("faceplate.loop")));
+        } else {
+            ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
+        }
         let modes = [tr!("mode.man"), tr!("mode.auto")];
         let chosen = usize::from(now.mode == Mode::Automatic);
         if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, Plot, PlotPoints};
 use vasos_engine::document::{
-    Document, DocumentCommand, ModelEntry, ModelOrigin, NewModel, SourceChoice, Stretch,
+    Document, DocumentCommand, FittedRows, ModelEntry, ModelOrigin, NewModel, SourceChoice, Stretch,
 };
 use vasos_engine::identify::{FitOptions, FitProblem, fit_fopdt};
 use vasos_engine::model::{Fopdt, ProcessModel};
@@ -52,6 +52,7 @@ impl FitData {
                 model: ProcessModel::Fopdt(fit.model),
                 origin: self.origin,
                 fit: Some(Arc::new(fit)),
+                rows: Some(Arc::new(FittedRows { time_s: self.time_s, pv: self.pv })),
                 pv_unit: self.pv_unit,
                 mv_unit: self.mv_unit,
             })),
@@ -101,7 +102,9 @@ pub fn data(document: &Document, run: &RunTrace, state: &State, focus: usize) ->
 fn of_run(document: &Document, run: &RunTrace, stretch: Stretch, focus: usize) -> Result<FitData, String> {
     let columns = (run.column(ChannelKind::Pv(focus)), run.column(ChannelKind::Mv(focus)));
     let (Some(pv), Some(mv)) = columns else { return Err(tr!("identify.no_data")) };
-    let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s);
+    // Another configuration is another loop: only what came after the last change is of this one.
+    let from_s = run.last_change_s(stretch.to_s).map_or(stretch.from_s, |s| s.max(stretch.from_s));
+    let range = pv.index_at(from_s)..pv.index_at(stretch.to_s);
     let active = document.rig.active_loops().get(focus);
     let spec = &document.rig.network.spec;
     let unit =
@@ -136,7 +139,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         }
         if let Some(entry) = view.document.model() {
             verdict(ui, entry);
-            overlay(ui, view, entry);
+            overlay(ui, entry);
         } else {
             ui.add(
                 egui::Label::new(RichText::new(tr!("identify.hint")).color(theme::palette(ui).weak)).wrap(),
@@ -150,9 +153,9 @@ fn source(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<A
     let document = view.document;
     let is_log = document.source == SourceChoice::Log;
     if let (true, Some(log)) = (is_log, &document.log) {
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            let width = (ui.available_width() - 100.0) / 3.0;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            let width = (ui.available_width() - 142.0) / 3.0;
             let mut roles = document.roles;
             let mut changed = false;
             for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
@@ -193,13 +196,11 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
         return;
     }
     let p = theme::palette(ui);
-    let latest = view.document.model().or(view.document.models.last());
-    let units = latest.map_or(String::new(), gain_unit);
     egui::ScrollArea::horizontal().id_salt("models").show(ui, |ui| {
         egui::Grid::new("models").striped(true).spacing([7.0, 3.0]).show(ui, |ui| {
             for title in [
                 tr!("identify.model"),
-                format!("K {units}"),
+                "K".to_owned(),
                 "T [s]".to_owned(),
                 "L [s]".to_owned(),
                 tr!("identify.fit_percent"),
@@ -213,10 +214,6 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
             }
         });
     });
-}
-
-fn gain_unit(entry: &ModelEntry) -> String {
-    format!("[{}]", text::quotient(&entry.pv_unit, &entry.mv_unit))
 }
 
 fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Action>) {
@@ -250,9 +247,15 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
         (time_constant_s, half(intervals.map(|i| i.time_constant_s))),
         (dead_time_s, half(intervals.map(|i| i.dead_time_s))),
     ];
-    for (value, half) in cells {
-        let plus = half.map_or(String::new(), |h| format!(" ±{}", text::rough(h)));
-        ui.label(RichText::new(format!("{}{plus}", text::brief(value))).size(theme::TABLE));
+    for (i, (value, half)) in cells.into_iter().enumerate() {
+        // An interval far wider than the value says nothing in digits.
+        let plus = half.map_or(String::new(), |h| {
+            if h > 10.0 * f64::abs(value) { " ± ?".to_owned() } else { format!(" ±{}", text::rough(h)) }
+        });
+        // Long units of logs push the other columns out; they stand under the pointer.
+        let unit = text::quotient(&entry.pv_unit, &entry.mv_unit);
+        let unit = if i == 0 && unit.chars().count() <= 8 { format!(" {unit}") } else { String::new() };
+        ui.label(RichText::new(format!("{}{plus}{unit}", text::brief(value))).size(theme::TABLE));
     }
     let percent = entry.fit.as_ref().map_or("–".to_owned(), |f| text::fixed(f.fit_percent, 1));
     ui.label(RichText::new(percent).size(theme::TABLE));
@@ -281,6 +284,7 @@ fn type_model(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut V
                 model: ProcessModel::Fopdt(model),
                 origin: ModelOrigin::Typed,
                 fit: None,
+                rows: None,
                 pv_unit: "cm".to_owned(),
                 mv_unit: loop_unit.to_owned(),
             }))));
@@ -310,12 +314,9 @@ fn verdict(ui: &mut egui::Ui, entry: &ModelEntry) {
 }
 
 /// Data and free run of the model, with what the model leaves over.
-fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
-    let Some(fit) = &entry.fit else { return };
-    let Some((time_s, pv)) = fitted_data(view, entry) else { return };
-    if time_s.len() != fit.simulated.len() {
-        return;
-    }
+fn overlay(ui: &mut egui::Ui, entry: &ModelEntry) {
+    let (Some(fit), Some(rows)) = (&entry.fit, &entry.rows) else { return };
+    let (time_s, pv) = (&rows.time_s, &rows.pv);
     let p = theme::palette(ui);
     let thin = (time_s.len() / 1500).max(1);
     let points = |values: &[f64]| -> PlotPoints<'static> {
@@ -340,33 +341,9 @@ fn overlay(ui: &mut egui::Ui, view: &View, entry: &ModelEntry) {
         .x_grid_spacer(plots::time_marks)
         .y_grid_spacer(plots::y_marks)
         .show(ui, |plot| {
-            plot.line(Line::new(tr!("identify.data"), points(&pv)).color(p.ghost).width(1.2));
+            plot.line(Line::new(tr!("identify.data"), points(pv)).color(p.ghost).width(1.2));
             plot.line(
                 Line::new(tr!("identify.model"), points(&fit.simulated)).color(p.pv).width(theme::LINE),
             );
         });
-}
-
-fn fitted_data(view: &View, entry: &ModelEntry) -> Option<(Vec<f64>, Vec<f64>)> {
-    match &entry.origin {
-        ModelOrigin::Typed => None,
-        ModelOrigin::Run { tag, stretch } => {
-            let slot = view.document.rig.active_loops().iter().position(|l| l.id == *tag)?;
-            let (pv, mv) = (view.run.column(ChannelKind::Pv(slot))?, view.run.column(ChannelKind::Mv(slot))?);
-            let range = pv.index_at(stretch.from_s)..pv.index_at(stretch.to_s) + 1;
-            let whole =
-                range.filter(|&i| i < pv.len() && pv.values()[i].is_finite() && mv.values()[i].is_finite());
-            Some(whole.map(|i| (pv.time_s()[i], pv.values()[i])).unzip())
-        }
-        ModelOrigin::Log { name, stretch } => {
-            let log = view.document.log.as_ref().filter(|l| l.name == *name)?;
-            let (pv, mv) = (view.document.roles.pv?, view.document.roles.mv?);
-            let rows = log.complete(
-                &[&log.columns[pv].values, &log.columns[mv].values],
-                stretch.from_s,
-                stretch.to_s,
-            );
-            Some((rows.time_s, rows.columns.first()?.clone()))
-        }
-    }
 }

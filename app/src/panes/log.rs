@@ -17,20 +17,18 @@ pub struct State {
 pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let mut actions = vec![];
     let p = theme::palette(ui);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.checkbox(&mut state.only_abnormal, tr!("log.only_abnormal"));
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            if ui.button(tr!("log.clear")).clicked() {
-                actions.push(Action::ClearLog);
-            }
-            if ui.button(tr!("log.copy")).clicked() {
-                let lines = view.journal.iter().map(|e| {
-                    let time = e.time_s.map_or(String::new(), text::clock);
-                    format!("{time}\t{}", e.words)
-                });
-                actions.push(Action::Copy(lines.collect::<Vec<_>>().join("\n")));
-            }
-        });
+        if ui.button(tr!("log.copy")).clicked() {
+            let lines = view.journal.iter().map(|e| {
+                let time = e.time_s.map_or(String::new(), text::clock);
+                format!("{time}\t{}", e.words)
+            });
+            actions.push(Action::Copy(lines.collect::<Vec<_>>().join("\n")));
+        }
+        if ui.button(tr!("log.clear")).clicked() {
+            actions.push(Action::ClearLog);
+        }
     });
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let entries = view.journal.iter().rev().filter(|e| !state.only_abnormal || e.weight != Weight::Note);

@@ -106,7 +106,8 @@ fn curves(
     // Responses to a unit step: PV per PV (or per MV), MV per PV (or per MV).
     let per = if load { mv_unit } else { pv_unit };
     let of = if is_pv { pv_unit } else { mv_unit };
-    let unit = if of.is_empty() || per.is_empty() { String::new() } else { format!(" [{of}/{per}]") };
+    let known = !of.is_empty() && !per.is_empty();
+    let unit = if known { format!(" [{}]", text::quotient(of, per)) } else { String::new() };
     let mut plot = Plot::new(if is_pv { "step_y" } else { "step_u" })
         .height(height.max(50.0))
         .allow_scroll(false)
@@ -132,16 +133,19 @@ fn figures(ui: &mut egui::Ui, row: &Row, response: &Response, load: bool, units:
     let words = match response.metrics() {
         Ok(m) if row.analysis.stable => {
             let iae = if load { row.figures.iae_load } else { row.figures.iae_setpoint };
-            let unit = |u: &str| if u.is_empty() { "–".to_owned() } else { u.to_owned() };
-            let iae_unit =
-                if load { format!("{}·s/{}", unit(&units.0), unit(&units.1)) } else { "s".to_owned() };
+            // Of a unit step: the PV per PV for a setpoint, per MV for a load.
+            let gain = text::quotient(&units.0, &units.1);
+            let with = |number: String, unit: String| format!("{number} {unit}");
+            let of = |times: &str, square: &str| {
+                if load { format!("({gain}){square}·{times}") } else { times.to_owned() }
+            };
+            let tv_unit = if load { String::new() } else { text::quotient(&units.1, &units.0) };
             let first = tr!(
                 "step.figures",
-                iae = text::maybe(iae),
-                iae_unit = iae_unit,
-                ise = text::brief(m.ise),
-                itae = text::brief(m.itae),
-                tv = text::brief(m.total_variation)
+                iae = with(text::maybe(iae), of("s", "")),
+                ise = with(text::brief(m.ise), of("s", "²")),
+                itae = with(text::brief(m.itae), of("s²", "")),
+                tv = with(text::brief(m.total_variation), tv_unit).trim_end().to_owned()
             );
             match m.overshoot_percent {
                 Some(overshoot) => tr!("step.overshoot", overshoot = text::fixed(overshoot, 1), rest = first),

@@ -2,9 +2,7 @@
 //! stretch for identification.
 
 use eframe::egui::{self, Color32, Id, Role, WidgetInfo, vec2};
-use egui_plot::{
-    Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine,
-};
+use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine};
 use vasos_engine::document::{DocumentCommand, SourceChoice, Stretch};
 use vasos_engine::signal::{ChannelKind, Pyramid};
 
@@ -79,6 +77,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         let end = content.end_s.max(span);
         state.bounds_s = [end - span, end + 0.05 * span];
     }
+    legend(ui, &content);
     let height = ui.available_height();
     let upper = (height * 0.62).max(60.0);
     plot(ui, view, state, &p, true, upper, &content, &mut actions);
@@ -172,6 +171,19 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
     content
 }
 
+/// Names and colours of the curves, above the plots so that they hide nothing.
+fn legend(ui: &mut egui::Ui, content: &Content) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 0.0);
+        for curve in content.upper.iter().chain(&content.lower) {
+            let (rect, _) = ui.allocate_exact_size(vec2(14.0, 14.0), egui::Sense::hover());
+            ui.painter().hline(rect.x_range(), rect.center().y, egui::Stroke::new(2.0, curve.colour));
+            ui.add(egui::Label::new(egui::RichText::new(&curve.name).size(theme::SMALL)).extend());
+            ui.add_space(theme::GAP);
+        }
+    });
+}
+
 /// How a curve is drawn.
 struct Look {
     colour: Color32,
@@ -212,8 +224,11 @@ fn of_log<'a>(view: &View<'a>, p: &Palette) -> Content<'a> {
                 thin: false,
             });
         }
-        axes =
-            [roles.pv.map_or_else(|| "PV".to_owned(), name), roles.mv.map_or_else(|| "MV".to_owned(), name)];
+        let axis = |what: &str, index: Option<usize>| {
+            let unit = index.and_then(|i| log.table.columns[i].unit.clone());
+            unit.map_or_else(|| what.to_owned(), |u| format!("{what} [{u}]"))
+        };
+        axes = [axis("PV", roles.pv), axis("MV", roles.mv)];
     }
     let [upper_axis, lower_axis] = axes;
     Content { upper, lower, upper_axis, lower_axis, end_s }
@@ -263,10 +278,6 @@ fn plot(
                 egui_plot::HoverPosition::Elsewhere { position } => Some(at(position)),
             }
         });
-    // On a low plot a legend would hide the curves; its axis names the only one.
-    let legend =
-        Legend::default().position(Corner::LeftTop).background_alpha(0.7).text_style(egui::TextStyle::Small);
-    let plot = if height > 90.0 { plot.legend(legend) } else { plot };
     let bounds = state.bounds_s;
     let (brushing, follow) = (state.brushing, state.follow);
     let pixels = ui.available_width().max(100.0) as usize;

@@ -8,7 +8,7 @@ use vasos_engine::tune::{ControllerKind, find_rule};
 
 use crate::action::Action;
 use crate::panes::View;
-use crate::tuning::{PRESENT, Row};
+use crate::tuning::{PRESENT, Refusal, Row, same_units};
 use crate::widgets::segmented;
 use crate::{i18n, text, theme, tr};
 
@@ -73,25 +73,41 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     actions
 }
 
-fn shown(state: &State, row: &Row) -> bool {
-    if row.rule == PRESENT {
-        return true;
-    }
+fn shown(state: &State, kind: ControllerKind) -> bool {
     match state.kind {
-        1 => row.kind == ControllerKind::Pi,
-        2 => row.kind == ControllerKind::Pid,
-        3 => matches!(row.kind, ControllerKind::P | ControllerKind::Pd),
+        1 => kind == ControllerKind::Pi,
+        2 => kind == ControllerKind::Pid,
+        3 => matches!(kind, ControllerKind::P | ControllerKind::Pd),
         _ => true,
+    }
+}
+
+/// A rule that gives nothing for this model, with its reason under the pointer.
+fn refusal(line: &mut egui_extras::TableRow<'_, '_>, refusal: &Refusal, ink: egui::Color32) {
+    let why = i18n::say(&refusal.error);
+    line.col(|ui| {
+        let words = format!("{} · {}", tr!(refusal.title_key), refusal.kind);
+        ui.add(egui::Label::new(RichText::new(words).size(theme::TABLE).color(ink)).truncate())
+            .on_hover_text(&why);
+    });
+    for _ in 0..9 {
+        line.col(|ui| {
+            ui.label(RichText::new("–").size(theme::TABLE).color(ink)).on_hover_text(&why);
+        });
     }
 }
 
 fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &mut Vec<Action>) {
     let p = theme::palette(ui);
     let chosen = row_in_view(view).map(|r| (r.rule, r.kind));
-    let rows: Vec<&Row> = view.tuning.rows.iter().filter(|r| shown(state, r)).collect();
+    let rows: Vec<&Row> =
+        view.tuning.rows.iter().filter(|r| shown(state, r.kind) || r.rule == PRESENT).collect();
+    let refusals: Vec<&Refusal> = view.tuning.refusals.iter().filter(|r| shown(state, r.kind)).collect();
     let entry = view.document.model();
     let (pv, mv) = entry.map_or(("", ""), |e| (e.pv_unit.as_str(), e.mv_unit.as_str()));
-    let (gain, inverse) = (text::quotient(mv, pv), text::quotient(pv, mv));
+    // A long unit has no room above a narrow column; the pointer over the title shows it whole.
+    let short = |unit: String| if unit.chars().count() > 6 { "…".to_owned() } else { unit };
+    let (gain, inverse) = (short(text::quotient(mv, pv)), short(format!("{}·s", text::quotient(pv, mv))));
     let gains = match state.form {
         Form::Ideal => [format!("Kc\n{gain}"), "Ti\ns".to_owned(), "Td\ns".to_owned()],
         Form::Parallel => [format!("Kp\n{gain}"), format!("Ki\n{gain}/s"), format!("Kd\n{gain}·s")],
@@ -99,7 +115,7 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let rest = [
         ("Ms".to_owned(), tr!("tune.ms_hint")),
         ("Mt".to_owned(), tr!("tune.mt_hint")),
-        (format!("Jv\n{inverse}·s"), tr!("tune.jv_hint")),
+        (format!("Jv\n{inverse}"), tr!("tune.jv_hint")),
         (format!("Ju\n{gain}"), tr!("tune.ju_hint")),
         (tr!("tune.iae_header"), tr!("tune.iae_hint")),
         (tr!("tune.overshoot_header"), tr!("tune.overshoot_hint")),
@@ -132,8 +148,12 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
             }
         })
         .body(|body| {
-            body.rows(ROW, rows.len(), |mut line| {
-                let row = rows[line.index()];
+            body.rows(ROW, rows.len() + refusals.len(), |mut line| {
+                let index = line.index();
+                let Some(row) = rows.get(index) else {
+                    refusal(&mut line, refusals[index - rows.len()], p.weak);
+                    return;
+                };
                 let selected = chosen == Some((row.rule, row.kind));
                 line.set_selected(selected);
                 cells(&mut line, row, state, if selected { p.on_accent } else { p.text });
@@ -160,10 +180,10 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink
             .on_hover_text(words);
     });
     let g = &row.gains;
-    let none = |v: f64| if v == 0.0 || v.is_infinite() { "–".to_owned() } else { text::brief(v) };
+    let none = |v: f64| if v == 0.0 || v.is_infinite() { "–".to_owned() } else { text::cell(v) };
     let gains = match state.form {
-        Form::Ideal => [text::brief(g.kc), none(g.ti_s), none(g.td_s)],
-        Form::Parallel => [text::brief(g.kc), none(g.ki()), none(g.kd())],
+        Form::Ideal => [text::cell(g.kc), none(g.ti_s), none(g.td_s)],
+        Form::Parallel => [text::cell(g.kc), none(g.ki()), none(g.kd())],
     };
     for cell in gains {
         line.col(|ui| {
@@ -182,7 +202,9 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink
     let a = &row.analysis;
     for value in [a.ms, a.mt, a.jv, a.ju, row.figures.iae_load, row.figures.overshoot_percent] {
         line.col(|ui| {
-            ui.label(RichText::new(text::maybe(value)).size(theme::TABLE).color(ink));
+            ui.label(
+                RichText::new(value.map_or_else(|| "–".to_owned(), text::cell)).size(theme::TABLE).color(ink),
+            );
         });
     }
 }
@@ -190,9 +212,12 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink
 fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let Some(row) = row_in_view(view) else { return };
     let p = theme::palette(ui);
-    let words = row.warnings.iter().map(|w| i18n::say(w)).collect::<Vec<_>>().join(" · ");
+    let other_units = view.document.model().filter(|m| !same_units(view.document, m, view.focus));
+    let units = other_units.map(|m| tr!("tune.other_units", unit = text::quotient(&m.mv_unit, &m.pv_unit)));
+    let words = units.iter().cloned().chain(row.warnings.iter().map(|w| i18n::say(w)));
+    let words = words.collect::<Vec<_>>().join(" · ");
     let words = if row.analysis.stable { words } else { tr!("tune.unstable_hint") };
-    let flagged = !row.analysis.stable || row.warnings.iter().any(|w| w.limits_validity());
+    let flagged = units.is_some() || !row.analysis.stable || row.warnings.iter().any(|w| w.limits_validity());
     let source = match (words.is_empty(), flagged) {
         (true, _) => row.source.to_owned(),
         (false, true) => format!("! {words}"),
@@ -203,11 +228,15 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     line.on_hover_text(format!("{source}\n{}", row.source));
     ui.horizontal_wrapped(|ui| {
         let tag = view.snapshot.loops.get(view.focus).map(|l| l.tag.clone());
-        let able = tag.is_some() && row.rule != PRESENT && row.gains.ti_s.is_finite();
-        let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| tr!("tune.apply_to", tag = t));
+        let usable = row.gains.ti_s.is_finite() && row.analysis.stable;
+        let able = tag.is_some() && row.rule != PRESENT && usable;
+        let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| apply_words(view, row, t));
         let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
-        let hint =
-            if row.gains.ti_s.is_finite() { tr!("tune.apply_hint") } else { tr!("tune.needs_integral") };
+        let hint = match (row.analysis.stable, row.gains.ti_s.is_finite()) {
+            (false, _) => tr!("tune.unstable_hint"),
+            (true, false) => tr!("tune.needs_integral"),
+            (true, true) => tr!("tune.apply_hint"),
+        };
         if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked()
             && let Some(tag) = tag
         {
@@ -238,13 +267,28 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     });
 }
 
+/// The PV filter that a row brings along, in seconds, where it is not the one in use.
+///
+/// Unfiltered derivative action keeps the pump at its limits with a rig's noise: with the paper's AMIGO tuning of
+/// STAD a filter of about Td (1 s) ends that.
+fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
+    let now_s = view.document.rig.loops.get(tag).map_or(0.0, |s| s.pv_filter_s);
+    (row.gains.td_s > 0.0 && now_s == 0.0).then_some(row.gains.td_s)
+}
+
+/// What the button does, said on it.
+fn apply_words(view: &View, row: &Row, tag: &str) -> String {
+    match new_filter_s(view, row, tag) {
+        Some(filter_s) => tr!("tune.apply_filter", tag = tag, filter = text::brief(filter_s)),
+        None => tr!("tune.apply_to", tag = tag),
+    }
+}
+
 fn apply(view: &View, row: &Row, tag: String) -> Action {
     let settings = view.document.rig.loops.get(&tag);
     let (b, c) = settings.map_or((1.0, 0.0), |s| (s.tuning.b, s.tuning.c));
-    let filter_s = settings.map_or(0.0, |s| s.pv_filter_s);
-    // Unfiltered derivative action keeps the pump at its limits with this rig's noise; a filter of Td is what the
-    // specification ships AMIGO with (1 s).
-    let filter_s = if row.gains.td_s > 0.0 && filter_s == 0.0 { row.gains.td_s } else { filter_s };
+    let kept_s = settings.map_or(0.0, |s| s.pv_filter_s);
+    let filter_s = new_filter_s(view, row, &tag).unwrap_or(kept_s);
     let tuning = PidTuning { gains: row.gains, b, c };
     Action::Document(DocumentCommand::ApplyTuning(tag, tuning, filter_s))
 }

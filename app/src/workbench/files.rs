@@ -212,7 +212,9 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
             }
         });
     });
-    if modal.should_close() && matches!(answer, Answer::None) { Answer::Cancel } else { answer }
+    // A click beside the sheet must not throw away what was read.
+    let escaped = modal.is_top_modal && ui.input(|i| i.key_pressed(egui::Key::Escape));
+    if escaped && matches!(answer, Answer::None) { Answer::Cancel } else { answer }
 }
 
 fn facts(ui: &mut egui::Ui, sheet: &ImportSheet) {

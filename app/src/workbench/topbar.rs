@@ -189,7 +189,7 @@ impl Workbench {
                 let file =
                     recording.path().file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
                 let size = text::brief(recording.bytes() as f64 / 1e6);
-                let words = format!("REC {} · {size} MB", recording.rows());
+                let words = tr!("top.recording", rows = recording.rows(), size = size);
                 let hover = tr!(
                     "top.recording_hint",
                     file = file,

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::data::{
-    Candidate, Document, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings, SourceChoice, Stretch,
+    Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings,
+    SourceChoice, Stretch,
 };
 use crate::control::{GainsError, Mode, PidTuning, check_filter};
 use crate::explain::{Explain, number};
@@ -65,6 +66,8 @@ pub struct NewModel {
     pub origin: ModelOrigin,
     /// The fit that gave it.
     pub fit: Option<Arc<FopdtFit>>,
+    /// The rows it was fitted to.
+    pub rows: Option<Arc<FittedRows>>,
     /// Unit of its PV.
     pub pv_unit: String,
     /// Unit of its MV.
@@ -284,8 +287,8 @@ impl Document {
 
     fn add_model(&mut self, new: &NewModel) {
         let number = self.models.iter().map(|m| m.number).max().unwrap_or(0) + 1;
-        let NewModel { model, origin, fit, pv_unit, mv_unit } = new.clone();
-        self.models.push(ModelEntry { number, model, origin, fit, pv_unit, mv_unit });
+        let NewModel { model, origin, fit, rows, pv_unit, mv_unit } = new.clone();
+        self.models.push(ModelEntry { number, model, origin, fit, rows, pv_unit, mv_unit });
         self.model_in_use = Some(number);
         self.candidate = None;
     }

@@ -153,6 +153,15 @@ pub enum ModelOrigin {
     },
 }
 
+/// The rows a model was fitted to, kept to draw it on them whatever becomes of their source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedRows {
+    /// Times in seconds.
+    pub time_s: Vec<f64>,
+    /// PV in its unit.
+    pub pv: Vec<f64>,
+}
+
 /// A model of the list.
 #[derive(Debug, Clone)]
 pub struct ModelEntry {
@@ -164,6 +173,8 @@ pub struct ModelEntry {
     pub origin: ModelOrigin,
     /// The fit that gave it.
     pub fit: Option<Arc<FopdtFit>>,
+    /// The rows it was fitted to.
+    pub rows: Option<Arc<FittedRows>>,
     /// Unit of its PV, as shown.
     pub pv_unit: String,
     /// Unit of its MV, as shown.

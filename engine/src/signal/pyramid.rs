@@ -1,7 +1,7 @@
 //! Min/max pyramid: draws any stretch of a long signal with as many points as there are pixels.
 
 /// Points of level k that make one of level k + 1.
-const FAN: usize = 8;
+const FAN: usize = 4;
 
 /// Extremes of a stretch of samples, in the order in which they came.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +74,19 @@ impl Pyramid {
         self.time_s.clear();
         self.values.clear();
         self.levels.clear();
+    }
+
+    /// Forgets the oldest samples, so that `keep` are left.
+    pub fn keep_last(&mut self, keep: usize) {
+        let first = self.len().saturating_sub(keep);
+        if first == 0 {
+            return;
+        }
+        let mut kept = Self::default();
+        for (&time_s, &value) in self.time_s[first..].iter().zip(&self.values[first..]) {
+            kept.push(time_s, value);
+        }
+        *self = kept;
     }
 
     /// Index of the first sample at or after a time.
@@ -191,5 +204,17 @@ mod tests {
             assert!(out.iter().any(|q| q[1] == 1.0), "peak at {peak}");
             assert!(out.windows(2).all(|w| w[0][0] <= w[1][0]), "time goes forward");
         }
+    }
+
+    #[test]
+    fn forgetting_the_oldest_keeps_the_newest() {
+        let mut p = Pyramid::default();
+        for i in 0..1000 {
+            p.push(f64::from(i), f64::from(i % 13));
+        }
+        p.keep_last(300);
+        assert_eq!((p.len(), p.time_s()[0], p.values()[299]), (300, 700.0, f64::from(999 % 13)));
+        p.keep_last(400);
+        assert_eq!(p.len(), 300);
     }
 }

@@ -112,7 +112,8 @@ impl Layout {
         }
         if network.pumps.iter().any(|p| p.from.is_none()) {
             // Room for the tags above the pumps.
-            bounds.extend_with(pos2(all.left() - 0.4, top - 0.3));
+            bounds.extend_with(pos2(all.left() - 0.55, top - 0.3));
+            bounds.extend_with(pos2(all.right() + 0.85, top));
         }
         for route in &valve_routes {
             for point in &route.pipe {
@@ -138,9 +139,9 @@ impl Layout {
 fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Route) {
     let from = tanks[valve.from];
     let Some(to) = valve.to else {
-        let end = pos2(from.center().x, from.bottom() + 0.5);
+        let end = pos2(from.center().x, from.bottom() + 0.6);
         let pipe = vec![from.center_bottom(), end];
-        let at = from.center_bottom() + vec2(0.0, 0.2);
+        let at = from.center_bottom() + vec2(0.0, 0.34);
         return (
             ValvePlace { at, vertical: true, label_below: false },
             Route { pipe, falls_into: None, to_outside: true },
@@ -185,12 +186,14 @@ fn pump_route(
     top: f32,
 ) -> (Pos2, Vec<Pos2>, Route) {
     let target = tanks[pump.to];
-    let end = pos2(target.center().x, target.top() - 0.06);
     let Some(from) = pump.from else {
+        // Off the middle, where the readings leave room.
+        let end = pos2(target.center().x + 0.22, target.top() - 0.06);
         let at = pos2(target.left() + 0.06, top);
         let pipe = vec![at, pos2(end.x, top), end];
         return (at, vec![], Route { pipe, falls_into: Some(pump.to), to_outside: false });
     };
+    let end = pos2(target.center().x, target.top() - 0.06);
     let source = tanks[from];
     let at = pos2(all.right() + 0.72, source.center().y);
     let suction = vec![pos2(source.right(), at.y + 0.12), pos2(at.x, at.y + 0.12), at];

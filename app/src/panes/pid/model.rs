@@ -27,6 +27,8 @@ pub struct TankView {
     pub spill_cm3_s: f64,
     /// Where the spill falls: from the rim down.
     pub spill: [Pos2; 2],
+    /// A stream falls in where the reading would stand.
+    pub fed_on_the_right: bool,
     /// Setpoint in cm, where a loop holds this tank.
     pub setpoint_cm: Option<f64>,
 }
@@ -202,6 +204,7 @@ fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankVi
         height_cm,
         spill_cm3_s: now.spill_cm3_s,
         spill: [pos2(x, rect.top()), pos2(x, bottom)],
+        fed_on_the_right: snapshot.network.pumps.iter().any(|p| p.from.is_none() && p.to == i),
         setpoint_cm: held.map(|l| l.setpoint_cm),
     }
 }

@@ -133,8 +133,14 @@ fn tank(painter: &Painter, view: &TankView, p: &Palette, phase: f32) {
         p.text,
     );
     let reading = format!("{} cm", text::fixed(view.level_cm, 1));
-    let at = view.rect.right_top() + vec2(-6.0, 3.0);
-    painter.text(at, Align2::RIGHT_TOP, reading, FontId::proportional(13.0), p.text);
+    // In a narrow tank the reading goes under the tag, clear of the stream that falls in.
+    let below = view.fed_on_the_right || view.rect.width() < 110.0;
+    let (at, anchor) = if below {
+        (view.rect.left_top() + vec2(9.0, 19.0), Align2::LEFT_TOP)
+    } else {
+        (view.rect.right_top() + vec2(-6.0, 3.0), Align2::RIGHT_TOP)
+    };
+    painter.text(at, anchor, reading, FontId::proportional(13.0), p.text);
     if let Some(setpoint_cm) = view.setpoint_cm {
         let y = view.rect.bottom() - setpoint_cm as f32 * per_cm;
         let x = view.rect.right();
@@ -261,12 +267,13 @@ pub fn pump(painter: &Painter, view: &PumpView, scale: f32, hovered: bool, p: &P
     let flow = format!("{} cm³/s", text::fixed(view.discharge.flow_cm3_s, 1));
     if view.suction.pipe.is_empty() {
         let at = view.at - vec2(0.0, r + 3.0);
-        painter.text(
+        label(
+            painter,
             at,
             Align2::CENTER_BOTTOM,
             format!("{}  {input}", view.tag),
             theme::bold_font(12.0),
-            p.text,
+            p,
         );
     } else {
         let at = view.at + vec2(r * 0.2 + 2.0, r + 3.0);
@@ -288,7 +295,15 @@ pub fn pump(painter: &Painter, view: &PumpView, scale: f32, hovered: bool, p: &P
     }
 }
 
-/// The face behind the drawing.
+/// Words on the pane's own colour, so that no line strikes them through.
+fn label(painter: &Painter, at: Pos2, anchor: Align2, words: String, font: FontId, p: &Palette) {
+    let galley = painter.layout_no_wrap(words, font, p.text);
+    let rect = anchor.anchor_size(at, galley.size());
+    painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), 0.0, p.pane);
+    painter.galley(rect.min, galley, p.text);
+}
+
+/// The hint under the drawing.
 pub fn hint(painter: &Painter, rect: Rect, words: &str, p: &Palette) {
     painter.text(rect.left_bottom(), Align2::LEFT_BOTTOM, words, FontId::proportional(theme::SMALL), p.weak);
 }
