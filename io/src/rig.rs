@@ -63,7 +63,7 @@ pub enum FileError {
         /// Id of the configuration; the rig's where it has none.
         configuration: String,
         /// Why not.
-        error: CommandError,
+        error: Box<CommandError>,
     },
     /// It cannot be written.
     #[error("{path} cannot be written: {reason}")]
@@ -106,7 +106,7 @@ impl Explain for FileError {
     fn cause(&self) -> Option<&dyn Explain> {
         match self {
             Self::Rig { error, .. } => Some(error),
-            Self::Start { error, .. } => Some(error),
+            Self::Start { error, .. } => Some(&**error),
             _ => None,
         }
     }
@@ -124,7 +124,7 @@ impl FileError {
             Self::Start {
                 name: text("a.toml"),
                 configuration: text("coupled"),
-                error: CommandError::UnknownTag { tag: text("LIC-01") },
+                error: Box::new(CommandError::UnknownTag { tag: text("LIC-01") }),
             },
             Self::Write { path: text("a.csv"), reason: text("disk full") },
         ]
@@ -154,7 +154,7 @@ pub fn parse_rig(name: &str, text: &str) -> Result<Arc<Network>, FileError> {
     check_starts(&network).map_err(|start| FileError::Start {
         name: name.to_owned(),
         configuration: start.configuration,
-        error: start.error,
+        error: Box::new(start.error),
     })?;
     Ok(network)
 }

@@ -90,7 +90,7 @@ fn valves_that_differ_in_capitals_shared_a_column() {
 
 fn cannot_start(name: &str, text: &str) -> (String, CommandError) {
     match parse_rig(name, text) {
-        Err(FileError::Start { configuration, error, .. }) => (configuration, error),
+        Err(FileError::Start { configuration, error, .. }) => (configuration, *error),
         other => panic!("{other:?}"),
     }
 }
