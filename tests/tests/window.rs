@@ -332,6 +332,17 @@ fn other_rigs_languages_and_logs_look_as_they_did() {
         picture(&mut harness, id);
         results.extend_harness(&mut harness);
     }
+    let mut harness = window(small);
+    act(&mut harness, Action::Rig(RigCommand::Bump { tag: "TQ1".to_owned(), delta_cm: 27.0 }));
+    act(&mut harness, Action::Document(DocumentCommand::Mode("LIC-02".to_owned(), Mode::Manual)));
+    act(&mut harness, Action::Rig(RigCommand::Bump { tag: "TQ2".to_owned(), delta_cm: 27.0 }));
+    act(&mut harness, Action::Document(DocumentCommand::Angle("FV01".to_owned(), 8.0)));
+    send(&mut harness, 20);
+    wait(&mut harness, "overflow", |w| w.snapshot().samples == 20 && w.run().end_s() > 3.7);
+    harness.remove_cursor();
+    harness.run_steps(2);
+    picture(&mut harness, "overflow");
+    results.extend_harness(&mut harness);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("heater.csv");
     let mut text = "time [s];reactor temperature [degC];setpoint [degC];heater power [kW]\n".to_owned();

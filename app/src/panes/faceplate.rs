@@ -223,17 +223,19 @@ fn alarms(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let pump = &network.spec.pumps[now.pump].id;
     let tank = &network.spec.tanks[network.sensors[now.sensor].tank].id;
     let mine = |tag: &str| tag == now.tag || tag == sensor || tag == pump || tag == tank;
-    let mut any = false;
-    for alarm in view.snapshot.alarms.iter().filter(|a| mine(a.tag())) {
-        any = true;
-        let words = tr!(&format!("alarm.{}", alarm.key()), tag = alarm.tag());
-        egui::Frame::NONE.fill(p.alarm).corner_radius(3).inner_margin(4).show(ui, |ui| {
-            ui.add(
-                egui::Label::new(egui::RichText::new(format!("! {words}")).color(p.on_alarm).small()).wrap(),
-            );
-        });
-    }
-    if !any {
+    let alarms = view.snapshot.alarms.iter().filter(|a| mine(a.tag()));
+    let words: Vec<String> = alarms.map(|a| tr!(&format!("alarm.{}", a.key()), tag = a.tag())).collect();
+    let Some(first) = words.first() else {
         ui.weak(tr!("faceplate.no_alarm"));
-    }
+        return;
+    };
+    // One line, so that it is in view whatever the height; all of them under the pointer.
+    let more = if words.len() > 1 { format!(" +{}", words.len() - 1) } else { String::new() };
+    let line = egui::RichText::new(format!("! {first}{more}")).color(p.on_alarm).small();
+    egui::Frame::NONE.fill(p.alarm).corner_radius(3).inner_margin(egui::Margin::symmetric(4, 1)).show(
+        ui,
+        |ui| {
+            ui.add(egui::Label::new(line).truncate()).on_hover_text(words.join("\n"));
+        },
+    );
 }

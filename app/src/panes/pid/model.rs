@@ -107,6 +107,8 @@ pub struct BubbleView {
     pub at: Pos2,
     /// Its signal is not to be trusted.
     pub abnormal: bool,
+    /// Its mode stands to the left, clear of the pump's pipe.
+    pub mode_on_the_left: bool,
     /// Manual (`Some(false)`), automatic (`Some(true)`), or no controller.
     pub automatic: Option<bool>,
 }
@@ -222,6 +224,7 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
                 tag: spec.sensors[i].id.clone(),
                 at: frame.point(layout.sensors[i]),
                 abnormal: alarmed || now.is_some_and(|l| l.status == ReadingStatus::Broken),
+                mode_on_the_left: false,
                 automatic: None,
             }
         })
@@ -234,6 +237,7 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             tag: now.tag.clone(),
             at: frame.point(controller),
             abnormal: false,
+            mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some(),
             automatic: Some(now.mode == Mode::Automatic),
         });
         let down = snapshot.network.pumps[now.pump].from.is_some();

@@ -189,9 +189,11 @@ fn bubble(painter: &Painter, view: &BubbleView, radius: f32, p: &Palette) {
     }
     if let Some(automatic) = view.automatic {
         let words = if automatic { tr!("mode.auto") } else { tr!("mode.manual") };
-        let at = view.at + vec2(5.0, radius + 2.0);
+        let (aside, anchor) =
+            if view.mode_on_the_left { (-5.0, Align2::RIGHT_TOP) } else { (5.0, Align2::LEFT_TOP) };
+        let at = view.at + vec2(aside, radius + 2.0);
         let colour = if automatic { p.weak } else { p.caution };
-        painter.text(at, Align2::LEFT_TOP, words, theme::bold_font(10.5), colour);
+        painter.text(at, anchor, words, theme::bold_font(10.5), colour);
     }
     if view.abnormal {
         badge(painter, view.at - vec2(0.0, radius + 9.0), &tr!("pid.out_of_range"), p);
