@@ -199,7 +199,7 @@ fn models(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     egui::ScrollArea::horizontal().id_salt("models").show(ui, |ui| {
         egui::Grid::new("models").striped(true).spacing([7.0, 3.0]).show(ui, |ui| {
             for title in [
-                tr!("identify.model"),
+                "#".to_owned(),
                 "K".to_owned(),
                 "T [s]".to_owned(),
                 "L [s]".to_owned(),

@@ -58,7 +58,9 @@ fn decimal_marks(input: &GridInput, spacing: f32) -> Vec<GridMark> {
 /// Marks of a horizontal axis every 1, 2 or 5 times a power of ten.
 #[must_use]
 pub fn x_marks(input: GridInput) -> Vec<GridMark> {
-    decimal_marks(&input, X_SPACING)
+    let mut marks = decimal_marks(&input, X_SPACING);
+    keep_whole_labels(&mut marks, &input, X_SPACING);
+    marks
 }
 
 /// Marks of a vertical axis every 1, 2 or 5 times a power of ten.
@@ -73,11 +75,15 @@ pub fn time_marks(input: GridInput) -> Vec<GridMark> {
     let Some(least) = least_step(&input, 1.3 * X_SPACING) else { return vec![] };
     let tens_of_hours = (least / 36_000.0).ceil() * 36_000.0;
     let step = TIME_STEPS_S.into_iter().find(|s| *s >= least).unwrap_or(tens_of_hours);
-    // A label at the very end would be cut in half.
-    let half_label = 0.4 * least;
     let mut marks = marks(input.bounds, step);
-    marks.retain(|m| input.bounds.1 - m.value >= half_label);
+    keep_whole_labels(&mut marks, &input, X_SPACING);
     marks
+}
+
+/// Drops marks so close to the right end that their labels would be cut in half.
+fn keep_whole_labels(marks: &mut Vec<GridMark>, input: &GridInput, spacing: f32) {
+    let half_label = least_step(input, 0.45 * spacing).unwrap_or(0.0);
+    marks.retain(|m| input.bounds.1 - m.value >= half_label);
 }
 
 /// A mark's value with the decimals that its step needs.
