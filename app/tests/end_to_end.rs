@@ -89,7 +89,8 @@ fn a_log_is_fitted_a_run_recorded_and_the_next_start_remembers() {
     });
     let path = record(&mut window, &desk, 5);
     window.press("ctrl+r");
-    assert!(desk.look().difference(&desk.look(), 0..900) > 0.0, "the rig runs");
+    let first = desk.look();
+    window.wait("the streams to move", |_| (desk.look().difference(&first, 0..900) > 0.0).then_some(()));
     window.press("space");
     window.wait_still();
     window.wait("rest", |w| (w.load() < 0.05).then_some(()));
