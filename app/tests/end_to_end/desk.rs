@@ -58,7 +58,8 @@ impl Desk {
     /// A screen under a number that is free.
     pub fn new() -> Self {
         let screen = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1440x900x24", "-nolisten", "tcp"])
+            // Without -noreset it starts over when its last client leaves, and turns away who comes meanwhile.
+            .args(["-displayfd", "1", "-screen", "0", "1440x900x24", "-nolisten", "tcp", "-noreset"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
