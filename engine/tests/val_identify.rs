@@ -52,7 +52,7 @@ fn steps(time_s: &[f64], at: &[(f64, f64)], start: f64) -> Vec<f64> {
     time_s.iter().map(|&t| at.iter().rev().find(|(from, _)| t >= *from).map_or(start, |m| m.1)).collect()
 }
 
-/// spec/identify.md, "Must hold": noise-free data of 12 digits, T ≥ h/3, any dead time ≥ 0; K, T to 1e-6, L to 1e-6 T.
+/// The specification of identification, "Must hold": noise-free data of 12 digits, T ≥ h/3, any dead time ≥ 0; K, T to 1e-6, L to 1e-6 T.
 #[test]
 fn val_noise_free_fopdt_is_recovered_at_any_dead_time() {
     let h = 0.5;
@@ -209,7 +209,7 @@ fn coverage(seeds: u64) -> [u64; 3] {
     held
 }
 
-/// spec/identify.md asks for 93–97 % over 2,000 seeds. Over 300 the count of hits of an honest 95 % interval is
+/// The specification of identification asks for 93–97 % over 2,000 seeds. Over 300 the count of hits of an honest 95 % interval is
 /// binomial with mean 285 and sd 3.77; the bounds are four sd either side, 270 to 300.
 #[test]
 fn val_intervals_hold_the_truth_about_95_times_in_100() {
@@ -218,7 +218,7 @@ fn val_intervals_hold_the_truth_about_95_times_in_100() {
     }
 }
 
-/// spec/identify.md: 93–97 % over 2,000 fixed seeds, white noise of 1 % of the output's variance, L > 3 sd(L).
+/// The specification of identification: 93–97 % over 2,000 fixed seeds, white noise of 1 % of the output's variance, L > 3 sd(L).
 #[test]
 #[ignore = "release only: cargo test --release -p vasos-engine --test val_identify -- --ignored"]
 fn val_coverage_over_2000_seeds() {
