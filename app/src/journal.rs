@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{Event, EventKind, RigCommand};
 
 use crate::{i18n, text, tr};
@@ -133,10 +132,4 @@ fn done(command: &RigCommand) -> String {
 #[must_use]
 pub fn change(key: &str) -> String {
     tr!(&format!("change.{key}"))
-}
-
-/// The name of a change.
-#[must_use]
-pub fn of_change(command: &DocumentCommand) -> String {
-    change(command.key())
 }

@@ -2,6 +2,8 @@
 
 mod screen;
 mod skip;
+mod sources;
 
 pub use screen::{Frame, Screen, typed_model};
 pub use skip::skip;
+pub use sources::{root, sources};

@@ -1,8 +1,9 @@
 //! The house rules that a compiler does not check: who may depend on what, and what stays out of the source.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
+use vasos_tests::{root, sources};
 
 /// Windows and what draws in them.
 const WINDOW: [&str; 11] = [
@@ -41,10 +42,6 @@ const FORMATS: [&str; 16] = [
 const COLOURLESS: [&str; 2] = ["TRANSPARENT", "PLACEHOLDER"];
 const MOST_LINES: usize = 600;
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace")
-}
-
 /// Names of all crates that a package is built from.
 fn tree(package: &str) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
@@ -77,24 +74,6 @@ fn of_families<'a>(tree: &'a BTreeSet<String>, families: &[&str]) -> Vec<&'a str
     };
     let names = tree.iter().map(String::as_str);
     names.filter(|name| families.iter().any(|family| belongs(name, family))).collect()
-}
-
-/// Source files of a folder of the workspace with their text.
-fn sources(folder: &str) -> Vec<(PathBuf, String)> {
-    fn walk(at: &Path, found: &mut Vec<(PathBuf, String)>) {
-        let Ok(entries) = std::fs::read_dir(at) else { return };
-        for path in entries.flatten().map(|e| e.path()) {
-            if path.is_dir() {
-                walk(&path, found);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                let text = std::fs::read_to_string(&path).expect("a readable file");
-                found.push((path.strip_prefix(root()).expect("inside").to_owned(), text));
-            }
-        }
-    }
-    let mut found = Vec::new();
-    walk(&root().join(folder), &mut found);
-    found
 }
 
 fn all_sources() -> Vec<(PathBuf, String)> {

@@ -2,7 +2,7 @@
 //! against the English that errors print themselves.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vasos_app::cli::parse::ParseError;
 use vasos_engine::analyze::MetricsError;
@@ -20,12 +20,9 @@ use vasos_io::log::{ImportError, Repair};
 use vasos_io::recording::{RecordingError, RecordingTrouble};
 use vasos_io::rig::FileError;
 use vasos_io::settings::SettingsTrouble;
+use vasos_tests::{root, sources};
 
 type Sentences = BTreeMap<String, String>;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace")
-}
 
 /// A translation file with its nested keys joined by points.
 fn sentences(language: &str) -> Sentences {
@@ -91,21 +88,11 @@ fn arguments(text: &str) -> Vec<&str> {
     arguments
 }
 
+/// The app's code without its comments.
 fn app_sources() -> Vec<(PathBuf, String)> {
-    fn walk(at: &Path, found: &mut Vec<(PathBuf, String)>) {
-        let Ok(entries) = std::fs::read_dir(at) else { return };
-        for path in entries.flatten().map(|e| e.path()) {
-            if path.is_dir() {
-                walk(&path, found);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                let text = std::fs::read_to_string(&path).expect("a readable file");
-                let code = |l: &&str| !l.trim_start().starts_with("//");
-                found.push((path, text.lines().filter(code).collect::<Vec<_>>().join("\n")));
-            }
-        }
-    }
-    let mut found = Vec::new();
-    walk(&root().join("app/src"), &mut found);
+    let code = |l: &&str| !l.trim_start().starts_with("//");
+    let bare = |text: String| text.lines().filter(code).collect::<Vec<_>>().join("\n");
+    let found: Vec<_> = sources("app/src").into_iter().map(|(path, text)| (path, bare(text))).collect();
     assert!(!found.is_empty());
     found
 }
@@ -261,20 +248,10 @@ fn errors_say_in_the_window_what_they_print() {
 
 #[test]
 fn no_error_is_left_out_here() {
-    fn implementors(at: &Path, found: &mut BTreeSet<String>) {
-        let Ok(entries) = std::fs::read_dir(at) else { return };
-        for path in entries.flatten().map(|e| e.path()) {
-            if path.is_dir() {
-                implementors(&path, found);
-            } else if let Ok(text) = std::fs::read_to_string(&path) {
-                let names = text.lines().filter_map(|l| l.strip_prefix("impl Explain for "));
-                found.extend(names.map(|n| n.trim_end_matches([' ', '{']).to_owned()));
-            }
-        }
-    }
     let mut found = BTreeSet::new();
-    for layer in ["engine/src", "io/src", "app/src"] {
-        implementors(&root().join(layer), &mut found);
+    for (_, text) in ["engine/src", "io/src", "app/src"].into_iter().flat_map(sources) {
+        let names = text.lines().filter_map(|l| l.strip_prefix("impl Explain for "));
+        found.extend(names.map(|n| n.trim_end_matches([' ', '{']).to_owned()));
     }
     // A defect of a job of the window; private to it.
     found.remove("Defect");

@@ -12,11 +12,9 @@ use vasos_app::panes::pid::layout::Layout;
 use vasos_app::panes::pid::model::PidModel;
 use vasos_app::workbench::{Options, Workbench};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
-use vasos_engine::document::{
-    Candidate, DocumentCommand, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch,
-};
-use vasos_engine::model::{Fopdt, ProcessModel};
+use vasos_engine::document::{Candidate, DocumentCommand, LogRoles, SourceChoice, Stretch};
 use vasos_engine::session::RigCommand;
+use vasos_tests::typed_model;
 
 type Window<'a> = Harness<'a, Workbench>;
 
@@ -59,17 +57,6 @@ fn send(harness: &mut Window, samples: u64) {
     for _ in 0..samples {
         harness.state_mut().act(&ctx, Action::Step);
     }
-}
-
-fn model_command() -> DocumentCommand {
-    DocumentCommand::AddModel(Box::new(NewModel {
-        model: ProcessModel::Fopdt(Fopdt::new(4.9, 152.0, 2.0).expect("usable")),
-        origin: ModelOrigin::Typed,
-        fit: None,
-        rows: None,
-        pv_unit: "cm".to_owned(),
-        mv_unit: "V".to_owned(),
-    }))
 }
 
 /// The issue: a test turns a valve and finds the drawn flow equal to the snapshot's; levels, flows and arrows follow
@@ -264,7 +251,7 @@ fn bad_files_get_a_clear_error_and_lose_nothing() {
         (folder.path().join("nowhere.csv"), "cannot be read"),
     ];
     let mut harness = window([1440.0, 900.0]);
-    act(&mut harness, Action::Document(model_command()));
+    act(&mut harness, typed_model());
     for (path, words) in cases {
         let before = harness.state().journal().len();
         drop_on(&mut harness, path.clone());
@@ -288,7 +275,7 @@ fn the_window_looks_as_it_did() {
             if !dark {
                 act(&mut harness, Action::ToggleTheme);
             }
-            act(&mut harness, Action::Document(model_command()));
+            act(&mut harness, typed_model());
             send(&mut harness, 40);
             act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 16.0)));
             send(&mut harness, 200);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use eframe::egui;
 use vasos_engine::document::{Consequence, Document, DocumentCommand, rig_commands};
-use vasos_engine::session::{Rig, RigCommand, SessionCommand};
+use vasos_engine::session::{RigCommand, SessionCommand};
 use vasos_io::recording::{Recording, RecordingOptions};
 
 use super::jobs::Outcome;
@@ -128,12 +128,7 @@ impl Workbench {
 
     fn reload(&mut self, document: &Document) {
         let rig = &document.rig;
-        let load = Rig {
-            network: rig.network.clone(),
-            configuration: rig.configuration,
-            measurement: rig.measurement,
-            seed: rig.seed,
-        };
+        let load = rig.to_start();
         self.session_command(SessionCommand::Load(Box::new(load)));
         for command in rig.commands_after_load() {
             self.session_command(SessionCommand::Rig(command));

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use eframe::egui;
 use vasos_engine::document::{Document, History, SourceChoice};
-use vasos_engine::session::{Rig, Session, SessionCommand};
+use vasos_engine::session::{Session, SessionCommand};
 use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
@@ -77,12 +77,7 @@ impl Workbench {
         let preset = PRESETS.iter().find(|p| Some(p.id) == settings.rig.as_deref()).unwrap_or(&PRESETS[0]);
         let network = vasos_io::rig::preset(preset.id)?;
         let document = Document::new(network);
-        let rig = Rig {
-            network: document.rig.network.clone(),
-            configuration: document.rig.configuration,
-            measurement: document.rig.measurement,
-            seed: document.rig.seed,
-        };
+        let rig = document.rig.to_start();
         let repaint = ctx.clone();
         let session = Session::start(&rig, Box::new(move || repaint.request_repaint()))?;
         let tree = settings.layout.clone().unwrap_or_else(tiles::first_layout);

@@ -1,8 +1,10 @@
 //! The bar above the panes, the bar below them, and notices.
 
+use std::sync::LazyLock;
+
 use eframe::egui::{self, Align, Layout, RichText};
 use vasos_engine::document::{Document, DocumentCommand, SourceChoice};
-use vasos_engine::plant::Measurement;
+use vasos_engine::plant::{Measurement, Text};
 use vasos_engine::session::Snapshot;
 use vasos_io::rig::PRESETS;
 
@@ -292,14 +294,18 @@ impl Workbench {
     }
 }
 
+/// Titles of the presets, read once: a menu is drawn every frame.
+static PRESET_TITLES: LazyLock<Vec<(&'static str, Option<Text>)>> = LazyLock::new(|| {
+    let title = |id| vasos_io::rig::preset(id).ok().map(|n| n.spec.title.clone());
+    PRESETS.iter().map(|p| (p.id, title(p.id))).collect()
+});
+
 fn rig_menu(ui: &mut egui::Ui, document: &Document, actions: &mut Vec<Action>) {
     let language = i18n::current().tag();
-    for preset in PRESETS {
-        // Presets are parsed when the menu is open, which is seldom.
-        let title = vasos_io::rig::preset(preset.id)
-            .map_or(preset.id.to_owned(), |n| n.spec.title.get(language).to_owned());
-        if ui.selectable_label(document.rig.network.spec.id == preset.id, title).clicked() {
-            actions.push(Action::OpenPreset(preset.id));
+    for (id, title) in PRESET_TITLES.iter() {
+        let title = title.as_ref().map_or(*id, |t| t.get(language));
+        if ui.selectable_label(document.rig.network.spec.id == *id, title).clicked() {
+            actions.push(Action::OpenPreset(id));
         }
     }
     ui.separator();

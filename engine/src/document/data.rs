@@ -7,6 +7,7 @@ use crate::control::{LoopSpec, Mode, PidGains, PidTuning};
 use crate::identify::FopdtFit;
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
+use crate::session::Rig;
 use crate::signal::LogTable;
 
 /// Settings of one loop.
@@ -68,6 +69,17 @@ impl RigSettings {
         };
         settings.turn_valves();
         settings
+    }
+
+    /// What a session starts on; everything else follows by commands.
+    #[must_use]
+    pub fn to_start(&self) -> Rig {
+        Rig {
+            network: self.network.clone(),
+            configuration: self.configuration,
+            measurement: self.measurement,
+            seed: self.seed,
+        }
     }
 
     /// Puts the angles to those of the present configuration.
