@@ -130,7 +130,10 @@ impl Plant {
             if let Some(from) = pump.from {
                 slope[from] -= pumped;
             }
-            slope[pump.to] += self.pipes[i].arriving_cm3_s().unwrap_or(pumped);
+            let arriving = self.pipes[i].arriving_cm3_s().unwrap_or(pumped);
+            for &(to, share) in &pump.outlets {
+                slope[to] += share * arriving;
+            }
         }
         for (i, valve) in network.valves.iter().enumerate() {
             let flow = valve.law.flow_cm3_s(self.coefficients[i], valve.head_cm(levels), network.delta_cm);
@@ -209,7 +212,9 @@ impl Plant {
             if let Some(from) = pump.from {
                 work.after[from] -= work.pumped_volume[i];
             }
-            work.after[pump.to] += work.arriving_volume[i];
+            for &(to, share) in &pump.outlets {
+                work.after[to] += share * work.arriving_volume[i];
+            }
         }
         for (i, valve) in self.network.valves.iter().enumerate() {
             work.after[valve.from] -= work.valve_volume[i];

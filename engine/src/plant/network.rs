@@ -2,7 +2,7 @@
 
 use super::error::RigError;
 use super::names::check_names;
-use super::spec::{ConfigurationSpec, InputUnit, RigSpec, SensorSpec, ValveDrive, ValveLaw};
+use super::spec::{ConfigurationSpec, InputUnit, PumpSpec, RigSpec, SensorSpec, ValveDrive, ValveLaw};
 
 /// The schema of rig files this version reads.
 pub const RIG_SCHEMA: u32 = 1;
@@ -34,6 +34,8 @@ pub struct Pump {
     pub from: Option<usize>,
     /// Tank it feeds.
     pub to: usize,
+    /// Tanks it feeds with the share of the flow each gets: [`Self::to`] first, the shares add up to 1.
+    pub outlets: Vec<(usize, f64)>,
     /// Unit of the input.
     pub unit: InputUnit,
     /// Lowest input.
@@ -292,6 +294,7 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
             if from == Some(to) {
                 return Err(RigError::Loop { item: p.id.clone(), tank: p.to.clone() });
             }
+            let outlets = outlets(spec, p, to, from)?;
             value(&p.id, "min", p.min, p.min.abs() <= MOST, "-1e9…1e9")?;
             let above = p.max > p.min && p.max <= MOST;
             value(&p.id, "max", p.max, above, format!("> min = {} and ≤ 1e9", p.min))?;
@@ -310,6 +313,7 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
             Ok(Pump {
                 from,
                 to,
+                outlets,
                 unit: p.unit,
                 min: p.min,
                 max: p.max,
@@ -318,6 +322,27 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
             })
         })
         .collect()
+}
+
+/// The tanks a pump feeds with their shares, the main one first.
+fn outlets(
+    spec: &RigSpec,
+    pump: &PumpSpec,
+    to: usize,
+    from: Option<usize>,
+) -> Result<Vec<(usize, f64)>, RigError> {
+    let mut outlets = vec![(to, 1.0)];
+    for (id, &share) in &pump.split {
+        let tank = tank_index(spec, &pump.id, id)?;
+        if Some(tank) == from || tank == to {
+            return Err(RigError::Loop { item: pump.id.clone(), tank: id.clone() });
+        }
+        let left = outlets[0].1;
+        value(&pump.id, "split", share, share > 0.0 && share <= left, format!("> 0 and together ≤ 1 ({id})"))?;
+        outlets[0].1 = left - share;
+        outlets.push((tank, share));
+    }
+    Ok(outlets)
 }
 
 fn valves(spec: &RigSpec) -> Result<Vec<Valve>, RigError> {

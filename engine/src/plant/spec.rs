@@ -106,6 +106,9 @@ pub struct PumpSpec {
     pub from: Option<String>,
     /// Tank it feeds.
     pub to: String,
+    /// Shares of the flow, between 0 and 1, that a splitting valve sends to other tanks instead.
+    #[serde(default)]
+    pub split: BTreeMap<String, f64>,
     /// Unit of its input.
     pub unit: InputUnit,
     /// Lowest input.

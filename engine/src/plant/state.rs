@@ -209,7 +209,10 @@ impl Plant {
     pub fn set_delay(&mut self, pump: usize, delay_s: f64) {
         let homeless_cm3 = self.pipes[pump].set_delay(delay_s);
         if homeless_cm3 > 0.0 {
-            self.pour(self.network.pumps[pump].to, homeless_cm3);
+            for outlet in 0..self.network.pumps[pump].outlets.len() {
+                let (to, share) = self.network.pumps[pump].outlets[outlet];
+                self.pour(to, share * homeless_cm3);
+            }
         }
     }
 

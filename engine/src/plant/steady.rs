@@ -97,7 +97,9 @@ fn rates(
     let mut jacobian = DMatrix::zeros(n, n);
     for (pump, &input) in network.pumps.iter().zip(inputs) {
         let flow = pump.flow_cm3_s(input);
-        rate[pump.to] += flow;
+        for &(to, share) in &pump.outlets {
+            rate[to] += share * flow;
+        }
         if let Some(from) = pump.from {
             rate[from] -= flow;
         }
