@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use vasos_engine::plant::FaultKind;
 use vasos_engine::session::{Event, EventKind, RigCommand};
 
 use crate::{i18n, text, tr};
@@ -125,7 +126,18 @@ fn done(command: &RigCommand) -> String {
             )
         }
         RigCommand::Seed { seed } => tr!("event.seed", seed = seed),
+        RigCommand::Fault { tag, fault } => tr!("event.fault", tag = tag, fault = fault_name(fault.kind())),
+        RigCommand::Repair { tag, kind: Some(kind) } => {
+            tr!("event.repair", tag = tag, fault = fault_name(*kind))
+        }
+        RigCommand::Repair { tag, kind: None } => tr!("event.repair_all", tag = tag),
     }
+}
+
+/// The name of a fault.
+#[must_use]
+pub fn fault_name(kind: FaultKind) -> String {
+    tr!(&format!("fault.{}", kind.key()))
 }
 
 /// The name of a step of the history.

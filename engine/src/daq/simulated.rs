@@ -6,7 +6,10 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::source::{RigControls, Source};
-use crate::plant::{Measurement, Network, Plant, Reading, RigError, Transmitter};
+use crate::plant::{
+    ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Plant, Reading, RigError, Transmitter,
+    check_fault, nearest,
+};
 
 /// A plant with its transmitters, converters and a seeded source of noise.
 #[derive(Debug, Clone)]
@@ -17,7 +20,13 @@ pub struct SimulatedRig {
     dac_step: Option<f64>,
     written: Vec<f64>,
     rng: Xoshiro256PlusPlus,
+    mishaps: Xoshiro256PlusPlus,
+    faults: Vec<ActiveFault>,
+    powered: bool,
 }
+
+/// Tells the source of spikes from that of noise.
+const MISHAPS: u64 = 0x5b1c_e5;
 
 impl SimulatedRig {
     /// A rig at the state of its file.
@@ -26,7 +35,11 @@ impl SimulatedRig {
     /// [`RigError`] when the water does not fit.
     pub fn new(network: Arc<Network>, measurement: Measurement, seed: u64) -> Result<Self, RigError> {
         let converters = network.spec.converters.as_ref();
-        let transmitters = network.sensors.iter().map(|s| Transmitter::new(&s.spec, converters)).collect();
+        let transmitters = network
+            .sensors
+            .iter()
+            .map(|s| Transmitter::new(&s.spec, converters, network.spec.sample_time_s))
+            .collect();
         let dac_step = converters.map(|c| c.dac_full_scale_v / f64::from(c.dac_bits).exp2());
         let plant = Plant::new(network)?;
         Ok(Self {
@@ -36,7 +49,28 @@ impl SimulatedRig {
             measurement,
             dac_step,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+            mishaps: Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS),
+            faults: vec![],
+            powered: true,
         })
+    }
+
+    fn switch(&mut self, part: FaultyPart, fault: Fault, on: bool) {
+        match (part, fault) {
+            (FaultyPart::Sensor(i), _) => self.transmitters[i].set_fault(fault, on),
+            (FaultyPart::Valve(i), Fault::Clogged { share }) => {
+                self.plant.set_clogged(i, if on { share } else { 1.0 });
+            }
+            (FaultyPart::Tank(i), Fault::Leak { k_cm2_5_s }) => {
+                self.plant.set_leak(i, if on { k_cm2_5_s } else { 0.0 });
+            }
+            (FaultyPart::Pump(i), _) => self.plant.set_pump_fault(i, fault, on),
+            (FaultyPart::Rig, _) => {
+                self.powered = !on;
+                self.plant.set_blackout(on);
+            }
+            _ => {}
+        }
     }
 }
 
@@ -46,9 +80,15 @@ impl Source for SimulatedRig {
     }
 
     fn read(&mut self, readings: &mut [Reading]) {
-        for (i, transmitter) in self.transmitters.iter().enumerate() {
+        for (i, transmitter) in self.transmitters.iter_mut().enumerate() {
             let level_cm = self.plant.levels_cm()[self.plant.network().sensors[i].tank];
-            readings[i] = transmitter.measure(level_cm, self.measurement, &mut self.rng);
+            readings[i] = transmitter.measure(
+                level_cm,
+                self.measurement,
+                self.powered,
+                &mut self.rng,
+                &mut self.mishaps,
+            );
         }
     }
 
@@ -59,7 +99,7 @@ impl Source for SimulatedRig {
         let limited =
             if mv.is_finite() { mv.clamp(last - most, last + most).clamp(p.min, p.max) } else { mv };
         let converted = match self.dac_step {
-            Some(step) if self.measurement.quantisation => (limited / step).round() * step,
+            Some(step) if self.measurement.quantisation => nearest(limited / step) * step,
             _ => limited,
         };
         self.plant.set_input(pump, converted)?;
@@ -81,6 +121,10 @@ impl Source for SimulatedRig {
 
     fn measurement(&self) -> Option<Measurement> {
         Some(self.measurement)
+    }
+
+    fn faults(&self) -> &[ActiveFault] {
+        &self.faults
     }
 
     fn plant(&self) -> Option<&Plant> {
@@ -125,5 +169,29 @@ impl RigControls for SimulatedRig {
 
     fn set_seed(&mut self, seed: u64) {
         self.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        self.mishaps = Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS);
+    }
+
+    fn set_fault(&mut self, tag: &str, fault: Fault) -> Result<(), RigError> {
+        let part = check_fault(self.plant.network(), tag, fault)?;
+        self.faults.retain(|f| f.tag != tag || f.fault.kind() != fault.kind());
+        self.faults.push(ActiveFault { tag: tag.to_owned(), fault });
+        self.switch(part, fault, true);
+        Ok(())
+    }
+
+    fn repair(&mut self, tag: &str, kind: Option<FaultKind>) -> Result<(), RigError> {
+        let of_tag = |f: &ActiveFault| f.tag == tag && kind.is_none_or(|kind| f.fault.kind() == kind);
+        let (over, left): (Vec<_>, Vec<_>) = self.faults.drain(..).partition(of_tag);
+        self.faults = left;
+        if over.is_empty() {
+            return Err(RigError::Sound { tag: tag.to_owned() });
+        }
+        if let Some(part) = FaultyPart::find(self.plant.network(), tag) {
+            for fault in over {
+                self.switch(part, fault.fault, false);
+            }
+        }
+        Ok(())
     }
 }

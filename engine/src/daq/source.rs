@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::plant::{Measurement, Network, Plant, Reading, RigError};
+use crate::plant::{ActiveFault, Fault, FaultKind, Measurement, Network, Plant, Reading, RigError};
 
 /// Something with sensors and pumps that a session reads, writes and lets time pass on.
 pub trait Source: Send {
@@ -23,6 +23,10 @@ pub trait Source: Send {
     fn rig(&mut self) -> Option<&mut dyn RigControls>;
     /// Imperfections that are on, for a simulated rig.
     fn measurement(&self) -> Option<Measurement>;
+    /// Faults that have been switched on, in that order.
+    fn faults(&self) -> &[ActiveFault] {
+        &[]
+    }
     /// True state of a simulated plant.
     fn plant(&self) -> Option<&Plant>;
 }
@@ -53,4 +57,14 @@ pub trait RigControls {
     fn set_measurement(&mut self, measurement: Measurement);
     /// Restarts the noise from a seed.
     fn set_seed(&mut self, seed: u64);
+    /// Breaks a sensor, valve, tank or pump, or takes the rig's power; a fault of the same kind is replaced.
+    ///
+    /// # Errors
+    /// [`RigError`] for a tag that is not there, or a fault or size that it cannot have.
+    fn set_fault(&mut self, tag: &str, fault: Fault) -> Result<(), RigError>;
+    /// Repairs one fault of a tag, or all of them.
+    ///
+    /// # Errors
+    /// [`RigError::Sound`] when there is nothing to repair.
+    fn repair(&mut self, tag: &str, kind: Option<FaultKind>) -> Result<(), RigError>;
 }

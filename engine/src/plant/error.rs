@@ -66,6 +66,22 @@ pub enum RigError {
         /// Tank at both ends.
         tank: String,
     },
+    /// A fault that such a part cannot have.
+    #[error("{tag} cannot have the fault {kind}; it can have: {possible}")]
+    Fault {
+        /// Tag of the part.
+        tag: String,
+        /// The fault.
+        kind: &'static str,
+        /// What is possible.
+        possible: String,
+    },
+    /// Nothing to repair.
+    #[error("{tag} has no such fault to repair")]
+    Sound {
+        /// Tag of the part.
+        tag: String,
+    },
     /// Two loops write the same pump.
     #[error("the loops {first} and {second} both write the pump {pump}")]
     SharedPump {
@@ -109,6 +125,8 @@ impl Explain for RigError {
             Self::Value { .. } => "rig.value",
             Self::Curve { .. } => "rig.curve",
             Self::Loop { .. } => "rig.loop",
+            Self::Fault { .. } => "rig.fault",
+            Self::Sound { .. } => "rig.sound",
             Self::SharedPump { .. } => "rig.shared_pump",
             Self::Water { .. } => "rig.water",
             Self::Unreachable { .. } => "rig.unreachable",
@@ -131,6 +149,10 @@ impl Explain for RigError {
             ],
             Self::Curve { item } => vec![("item", item.clone())],
             Self::Loop { item, tank } => vec![("item", item.clone()), ("tank", tank.clone())],
+            Self::Fault { tag, kind, possible } => {
+                vec![("tag", tag.clone()), ("kind", (*kind).to_owned()), ("possible", possible.clone())]
+            }
+            Self::Sound { tag } => vec![("tag", tag.clone())],
             Self::SharedPump { first, second, pump } => {
                 vec![("first", first.clone()), ("second", second.clone()), ("pump", pump.clone())]
             }
@@ -159,6 +181,8 @@ impl RigError {
             Self::Value { item: text("TQ1"), field: "area_cm2", value: -1.0, expected: text("> 0") },
             Self::Curve { item: text("BA01") },
             Self::Loop { item: text("FV01"), tank: text("TQ1") },
+            Self::Fault { tag: text("FV01"), kind: "stuck", possible: text("clogged") },
+            Self::Sound { tag: text("LT02") },
             Self::SharedPump { first: text("LIC-01"), second: text("LIC-02"), pump: text("BA01") },
             Self::Water { tank: text("TQ4"), level_cm: -3.5 },
             Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },

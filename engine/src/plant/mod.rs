@@ -5,19 +5,24 @@
 //! rounding. Units: cm, s, cm², cm³/s. Inputs that are not finite are refused before they reach a state.
 
 mod error;
+mod faults;
 mod flow_law;
 mod integrator;
 mod names;
 mod network;
 mod pipe;
+mod rims;
 mod sensor;
 pub mod spec;
 mod state;
 mod steady;
+mod streams;
 
 pub use error::RigError;
+pub use faults::{ActiveFault, Fault, FaultKind, FaultyPart, check_fault};
 pub use flow_law::{regularised_root, regularised_root_slope};
 pub use network::{Network, Pump, RIG_SCHEMA, Sensor, Tank, Valve};
+pub(crate) use sensor::nearest;
 pub use sensor::{Measurement, Reading, ReadingStatus, Transmitter};
 pub use spec::{InputUnit, RigSpec, Text};
 pub use state::{Balance, Plant};

@@ -3,6 +3,7 @@
 use super::error::RigError;
 use super::names::check_names;
 use super::spec::{ConfigurationSpec, InputUnit, PumpSpec, RigSpec, SensorSpec, ValveDrive, ValveLaw};
+use super::streams::MOST_TANKS;
 
 /// The schema of rig files this version reads.
 pub const RIG_SCHEMA: u32 = 1;
@@ -156,6 +157,8 @@ impl Network {
         if spec.tanks.is_empty() {
             return Err(RigError::NoTank);
         }
+        let tanks_most = format!("at most {MOST_TANKS}");
+        value(&spec.id, "tanks", spec.tanks.len() as f64, spec.tanks.len() <= MOST_TANKS, tanks_most)?;
         check_names(&spec)?;
         value(&spec.id, "delta_cm", spec.delta_cm, (0.0..=MOST).contains(&spec.delta_cm), "0…1e9")?;
         let sampled = (1e-3..=3600.0).contains(&spec.sample_time_s);
@@ -338,7 +341,13 @@ fn outlets(
             return Err(RigError::Loop { item: pump.id.clone(), tank: id.clone() });
         }
         let left = outlets[0].1;
-        value(&pump.id, "split", share, share > 0.0 && share <= left, format!("> 0 and together ≤ 1 ({id})"))?;
+        value(
+            &pump.id,
+            "split",
+            share,
+            share > 0.0 && share <= left,
+            format!("> 0 and together ≤ 1 ({id})"),
+        )?;
         outlets[0].1 = left - share;
         outlets.push((tank, share));
     }

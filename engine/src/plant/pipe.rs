@@ -55,33 +55,48 @@ impl Pipe {
         self.pieces.iter().map(|p| p.duration_s * p.flow_cm3_s).sum()
     }
 
-    /// Lets `duration_s` pass, at most [`Self::time_to_change_s`]: that much leaves at the front and
-    /// the volume `entered_cm3` enters at the back.
-    pub fn shift(&mut self, duration_s: f64, entered_cm3: f64) {
+    /// Takes `duration_s` of stream off the front, at most [`Self::time_to_change_s`].
+    #[inline]
+    pub fn take(&mut self, duration_s: f64) {
         let Some(front) = self.pieces.front_mut() else { return };
         front.duration_s -= duration_s;
-        let flow_cm3_s = entered_cm3 / duration_s;
-        if front.duration_s < SHORTEST_S {
-            let rest = *front;
-            self.pieces.pop_front();
-            match self.pieces.front_mut() {
-                Some(next) => {
-                    let volume = rest.duration_s * rest.flow_cm3_s + next.duration_s * next.flow_cm3_s;
-                    next.duration_s += rest.duration_s;
-                    next.flow_cm3_s =
-                        if rest.duration_s == 0.0 { next.flow_cm3_s } else { volume / next.duration_s };
-                }
-                None => {
-                    let duration_s = duration_s + rest.duration_s;
-                    let volume = entered_cm3 + (rest.duration_s * rest.flow_cm3_s);
-                    self.pieces.push_back(Piece { duration_s, flow_cm3_s: volume / duration_s });
-                    return;
-                }
-            }
+        if front.duration_s >= SHORTEST_S || self.pieces.len() == 1 {
+            return;
+        }
+        // What is left is rounding; its water goes with the next piece.
+        if let Some(rest) = self.pieces.pop_front()
+            && rest.duration_s != 0.0
+            && let Some(next) = self.pieces.front_mut()
+        {
+            let volume = rest.duration_s * rest.flow_cm3_s + next.duration_s * next.flow_cm3_s;
+            next.duration_s += rest.duration_s;
+            next.flow_cm3_s = volume / next.duration_s;
+        }
+    }
+
+    /// Gives `duration_s` of stream back to the front.
+    pub fn give_back(&mut self, duration_s: f64, flow_cm3_s: f64) {
+        match self.pieces.front_mut() {
+            Some(front) if front.flow_cm3_s == flow_cm3_s => front.duration_s += duration_s,
+            _ => self.pieces.push_front(Piece { duration_s, flow_cm3_s }),
+        }
+    }
+
+    /// Lets a flow in at the back for `duration_s`.
+    #[inline]
+    pub fn feed(&mut self, duration_s: f64, flow_cm3_s: f64) {
+        if self.delay_s <= SHORTEST_S {
+            return;
         }
         match self.pieces.back_mut() {
             Some(back) if (back.flow_cm3_s - flow_cm3_s).abs() <= 1e-14 * flow_cm3_s.abs() => {
-                let volume = back.duration_s * back.flow_cm3_s + entered_cm3;
+                let volume = back.duration_s * back.flow_cm3_s + duration_s * flow_cm3_s;
+                back.duration_s += duration_s;
+                back.flow_cm3_s = volume / back.duration_s;
+            }
+            // A last piece whose time is spent holds no more than rounding.
+            Some(back) if back.duration_s < SHORTEST_S => {
+                let volume = back.duration_s * back.flow_cm3_s + duration_s * flow_cm3_s;
                 back.duration_s += duration_s;
                 back.flow_cm3_s = volume / back.duration_s;
             }
@@ -135,7 +150,8 @@ mod tests {
             }
             delivered += arriving * dt;
             entered += 20.0 * dt;
-            pipe.shift(dt, 20.0 * dt);
+            pipe.feed(dt, 20.0);
+            pipe.take(dt);
             time_s += dt;
         }
         assert!((arrival_s.expect("the step arrives") - 1.7).abs() < 1e-9);
@@ -145,11 +161,25 @@ mod tests {
     #[test]
     fn a_new_delay_keeps_the_water() {
         let mut pipe = Pipe::filled(1.7, 10.0);
-        pipe.shift(0.4, 2.0);
+        pipe.feed(0.4, 5.0);
+        pipe.take(0.4);
         let before = pipe.volume_cm3();
         assert!(pipe.set_delay(1.3).abs() < 1e-12);
         assert!((pipe.volume_cm3() - before).abs() < 1e-12);
         assert!((pipe.set_delay(0.0) - before).abs() < 1e-12);
         assert!(pipe.arriving_cm3_s().is_none());
+    }
+
+    #[test]
+    fn what_is_given_back_is_there_again() {
+        let mut pipe = Pipe::filled(1.7, 10.0);
+        pipe.feed(0.2, 20.0);
+        let before = pipe.volume_cm3();
+        pipe.take(1.7);
+        pipe.take(0.1);
+        pipe.give_back(0.1, 20.0);
+        pipe.give_back(0.3, 10.0);
+        assert!((before - pipe.volume_cm3() - 14.0).abs() < 1e-12);
+        assert!((pipe.time_to_change_s() - 0.3).abs() < 1e-12);
     }
 }

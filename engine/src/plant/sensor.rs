@@ -1,9 +1,10 @@
 //! Level sensors: noise, resolution, the 4–20 mA signal and the input converter.
 
-use rand::Rng;
+use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
+use super::faults::Fault;
 use super::spec::{ConverterSpec, SensorSpec};
 
 /// Currents between which a transmitter signals, NAMUR NE 43: 3.8 to 20.5 mA.
@@ -46,10 +47,24 @@ pub enum ReadingStatus {
 /// One measured level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Level in cm as the controller sees it.
+    /// Level in cm as the controller sees it; NaN where the wire is broken, which is no level.
     pub level_cm: f64,
     /// What it is worth.
     pub status: ReadingStatus,
+}
+
+/// Whatever is wrong with a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Ills {
+    /// Gives this reading for ever.
+    stuck: Option<Reading>,
+    /// Speed of the zero in cm/s.
+    drift_cm_s: f64,
+    /// How far the zero has moved, in cm.
+    offset_cm: f64,
+    broken: bool,
+    /// Height in cm and mean time between two in seconds.
+    spikes: Option<(f64, f64)>,
 }
 
 /// A sensor with its converter, ready to measure.
@@ -59,12 +74,15 @@ pub struct Transmitter {
     resolution_cm: f64,
     range_cm: Option<[f64; 2]>,
     code_ma: f64,
+    sample_time_s: f64,
+    ills: Ills,
+    last: Reading,
 }
 
 impl Transmitter {
-    /// A sensor, and the converter behind it if the rig has one.
+    /// A sensor read every `sample_time_s`, and the converter behind it if the rig has one.
     #[must_use]
-    pub fn new(sensor: &SensorSpec, converters: Option<&ConverterSpec>) -> Self {
+    pub fn new(sensor: &SensorSpec, converters: Option<&ConverterSpec>, sample_time_s: f64) -> Self {
         let code_ma = converters
             .map_or(0.0, |c| 1000.0 * c.adc_full_scale_v / (f64::from(c.adc_bits).exp2() * c.shunt_ohm));
         Self {
@@ -72,25 +90,71 @@ impl Transmitter {
             resolution_cm: sensor.resolution_cm,
             range_cm: sensor.range_cm,
             code_ma,
+            sample_time_s,
+            ills: Ills::default(),
+            last: Reading { level_cm: f64::NAN, status: ReadingStatus::Good },
+        }
+    }
+
+    /// Switches a sensor's fault on or off; other faults than a sensor's do nothing.
+    pub fn set_fault(&mut self, fault: Fault, on: bool) {
+        let ills = &mut self.ills;
+        match fault {
+            Fault::Stuck => ills.stuck = on.then_some(self.last),
+            Fault::BrokenWire => ills.broken = on,
+            Fault::Spikes { height_cm, every_s } => ills.spikes = on.then_some((height_cm, every_s)),
+            // A drift that is repaired leaves a zero that has been set right.
+            Fault::Drift { rate_cm_s } if on => ills.drift_cm_s = rate_cm_s,
+            Fault::Drift { .. } => (ills.drift_cm_s, ills.offset_cm) = (0.0, 0.0),
+            _ => {}
         }
     }
 
     /// Measures a true level in cm. One random number is drawn whether noise is on or off, so that
-    /// switching it leaves the rest of a seeded run as it was.
-    pub fn measure(&self, level_cm: f64, how: Measurement, rng: &mut impl Rng) -> Reading {
+    /// switching it leaves the rest of a seeded run as it was; spikes draw from a source of their own.
+    pub fn measure(
+        &mut self,
+        level_cm: f64,
+        how: Measurement,
+        powered: bool,
+        rng: &mut impl Rng,
+        mishaps: &mut impl Rng,
+    ) -> Reading {
         let draw: f64 = StandardNormal.sample(rng);
-        let mut level_cm = if how.noise { level_cm + self.noise_cm * draw } else { level_cm };
-        if how.resolution && self.resolution_cm > 0.0 {
-            level_cm = (level_cm / self.resolution_cm).round() * self.resolution_cm;
+        self.ills.offset_cm += self.ills.drift_cm_s * self.sample_time_s;
+        if self.ills.broken || !powered {
+            return Reading { level_cm: f64::NAN, status: ReadingStatus::Broken };
         }
-        let Some([low, high]) = self.range_cm else {
-            return Reading { level_cm, status: ReadingStatus::Good };
+        if let Some(stuck) = self.ills.stuck {
+            return stuck;
+        }
+        let mut level_cm = level_cm + self.ills.offset_cm;
+        if how.noise {
+            level_cm += self.noise_cm * draw;
+        }
+        if let Some((height_cm, every_s)) = self.ills.spikes
+            && mishaps.random::<f64>() * every_s < self.sample_time_s
+        {
+            level_cm += if mishaps.random::<bool>() { height_cm } else { -height_cm };
+        }
+        if how.resolution && self.resolution_cm > 0.0 {
+            level_cm = nearest(level_cm / self.resolution_cm) * self.resolution_cm;
+        }
+        let reading = match self.range_cm {
+            Some([low, high]) => self.signal(level_cm, low, high - low, how.quantisation),
+            None => Reading { level_cm, status: ReadingStatus::Good },
         };
-        let span_cm = high - low;
-        let wanted_ma = 4.0 + 16.0 * (level_cm - low) / span_cm;
+        self.last = reading;
+        reading
+    }
+
+    /// Through the 4–20 mA signal and the converter.
+    #[inline]
+    fn signal(&self, level_cm: f64, low_cm: f64, span_cm: f64, quantisation: bool) -> Reading {
+        let wanted_ma = 4.0 + 16.0 * (level_cm - low_cm) / span_cm;
         let mut current_ma = wanted_ma.clamp(LOWEST_MA, HIGHEST_MA);
-        if how.quantisation && self.code_ma > 0.0 {
-            current_ma = (current_ma / self.code_ma).round() * self.code_ma;
+        if quantisation && self.code_ma > 0.0 {
+            current_ma = nearest(current_ma / self.code_ma) * self.code_ma;
         }
         let status = if current_ma < BROKEN_MA {
             ReadingStatus::Broken
@@ -101,8 +165,16 @@ impl Transmitter {
         } else {
             ReadingStatus::Good
         };
-        Reading { level_cm: low + span_cm * (current_ma - 4.0) / 16.0, status }
+        Reading { level_cm: low_cm + span_cm * (current_ma - 4.0) / 16.0, status }
     }
+}
+
+/// The nearest whole number of a quotient below 2⁵¹; halves go to the even neighbour. (`f64::round` is a call into
+/// the mathematical library on the default target.)
+#[inline]
+pub(crate) fn nearest(x: f64) -> f64 {
+    const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
+    (x + SHIFT) - SHIFT
 }
 
 #[cfg(test)]
@@ -133,11 +205,13 @@ mod tests {
     fn one_code_of_the_converter_is_0_015_cm() {
         // plant.md: 12 bit over 0–10 V, 250 Ω, 24 cm over 16 mA.
         let (sensor, converters) = lt02();
-        let t = Transmitter::new(&sensor, Some(&converters));
+        let mut t = Transmitter::new(&sensor, Some(&converters), 0.2);
+        let mut mishaps = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(2);
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
         let how = Measurement { noise: false, quantisation: true, resolution: false };
-        let mut seen: Vec<f64> =
-            (0..4000).map(|i| t.measure(10.0 + f64::from(i) * 1e-4, how, &mut rng).level_cm).collect();
+        let mut seen: Vec<f64> = (0..4000)
+            .map(|i| t.measure(10.0 + f64::from(i) * 1e-4, how, true, &mut rng, &mut mishaps).level_cm)
+            .collect();
         seen.dedup();
         let step = (seen[20] - seen[10]) / 10.0;
         assert!((step - 0.014_65).abs() < 1e-5, "{step}");
@@ -146,13 +220,43 @@ mod tests {
     #[test]
     fn out_of_range_saturates_at_3_8_and_20_5_ma() {
         let (sensor, _) = lt02();
-        let t = Transmitter::new(&sensor, None);
+        let mut t = Transmitter::new(&sensor, None, 0.2);
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
-        let low = t.measure(0.0, Measurement::IDEAL, &mut rng);
+        let mut mishaps = rng.clone();
+        let low = t.measure(0.0, Measurement::IDEAL, true, &mut rng, &mut mishaps);
         assert_eq!(low.status, ReadingStatus::BelowRange);
         assert!((low.level_cm - 1.2).abs() < 1e-12);
-        let high = t.measure(27.0, Measurement::IDEAL, &mut rng);
+        let high = t.measure(27.0, Measurement::IDEAL, true, &mut rng, &mut mishaps);
         assert_eq!(high.status, ReadingStatus::AboveRange);
         assert!((high.level_cm - 26.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn faults_do_what_they_say_and_end_when_repaired() {
+        let (sensor, _) = lt02();
+        let mut t = Transmitter::new(&sensor, None, 0.2);
+        let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut mishaps = rng.clone();
+        let how = Measurement::IDEAL;
+        let mut read =
+            |t: &mut Transmitter, level: f64, powered| t.measure(level, how, powered, &mut rng, &mut mishaps);
+        assert!((read(&mut t, 10.0, true).level_cm - 10.0).abs() < 1e-12);
+        t.set_fault(Fault::Stuck, true);
+        assert!((read(&mut t, 12.0, true).level_cm - 10.0).abs() < 1e-12);
+        t.set_fault(Fault::Stuck, false);
+        t.set_fault(Fault::BrokenWire, true);
+        let broken = read(&mut t, 12.0, true);
+        assert!(broken.level_cm.is_nan() && broken.status == ReadingStatus::Broken);
+        t.set_fault(Fault::BrokenWire, false);
+        assert_eq!(read(&mut t, 12.0, false).status, ReadingStatus::Broken);
+        t.set_fault(Fault::Drift { rate_cm_s: 0.1 }, true);
+        let drifted: Vec<f64> = (0..100).map(|_| read(&mut t, 12.0, true).level_cm).collect();
+        assert!((drifted[99] - 14.0).abs() < 1e-9, "{}", drifted[99]); // 100 samples of 0.2 s at 0.1 cm/s
+        t.set_fault(Fault::Drift { rate_cm_s: 0.1 }, false);
+        assert!((read(&mut t, 12.0, true).level_cm - 12.0).abs() < 1e-12);
+        t.set_fault(Fault::Spikes { height_cm: 2.0, every_s: 20.0 }, true);
+        let spikes = (0..100_000).filter(|_| (read(&mut t, 12.0, true).level_cm - 12.0).abs() > 1.9).count();
+        // One sample in a hundred: 1000 ± 31.
+        assert!((850..1150).contains(&spikes), "{spikes}");
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::{GainsError, Mode, PidTuning};
 use crate::explain::{Explain, number};
-use crate::plant::{Measurement, RigError};
+use crate::plant::{Fault, FaultKind, Measurement, RigError};
 
 /// A change of the rig or its loops; scenarios and sessions share it. Items are named by their tags.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -81,6 +81,22 @@ pub enum RigCommand {
         /// Seed.
         seed: u64,
     },
+    /// Breaks something.
+    Fault {
+        /// Sensor, valve, tank, pump, or the rig's id.
+        tag: String,
+        /// What breaks.
+        #[serde(flatten)]
+        fault: Fault,
+    },
+    /// Repairs something.
+    Repair {
+        /// Sensor, valve, tank, pump, or the rig's id.
+        tag: String,
+        /// One fault; absent: all of them.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        kind: Option<FaultKind>,
+    },
 }
 
 /// Why a command was not carried out. Nothing has changed then.
@@ -114,6 +130,14 @@ pub enum CommandError {
         /// Loop.
         tag: String,
     },
+    /// A state at rest asked of a rig that a fault keeps from it.
+    #[error("the rig cannot be put to rest while {tag} has a fault ({kind}); repair it first")]
+    Faulty {
+        /// Part with the fault.
+        tag: String,
+        /// The fault.
+        kind: &'static str,
+    },
     /// A valve, tank or configuration of something that has none.
     #[error("this source has no valves or tanks that can be set from here")]
     NotARig,
@@ -133,6 +157,7 @@ impl Explain for CommandError {
             Self::UnknownTag { .. } => "command.unknown_tag",
             Self::Setpoint { .. } => "command.setpoint",
             Self::Automatic { .. } => "command.automatic",
+            Self::Faulty { .. } => "command.faulty",
             Self::NotARig => "command.not_a_rig",
             Self::Speed { .. } => "command.speed",
         }
@@ -146,6 +171,7 @@ impl Explain for CommandError {
             Self::Setpoint { tag, level_cm, rim_cm } => {
                 vec![("tag", tag.clone()), ("level_cm", number(*level_cm)), ("rim_cm", number(*rim_cm))]
             }
+            Self::Faulty { tag, kind } => vec![("tag", tag.clone()), ("kind", (*kind).to_owned())],
             Self::NotARig => vec![],
             Self::Speed { speed } => vec![("speed", number(*speed))],
         }
@@ -161,6 +187,7 @@ impl CommandError {
             Self::UnknownTag { tag: tag() },
             Self::Setpoint { tag: tag(), level_cm: 31.0, rim_cm: 27.0 },
             Self::Automatic { tag: tag() },
+            Self::Faulty { tag: "TQ1".to_owned(), kind: "leak" },
             Self::NotARig,
             Self::Speed { speed: -3.0 },
         ]

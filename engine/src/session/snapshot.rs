@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::event::Alarm;
 use crate::control::{Mode, PidTuning};
-use crate::plant::{Balance, Measurement, Network, ReadingStatus};
+use crate::plant::{ActiveFault, Balance, Measurement, Network, ReadingStatus};
 
 /// A tank now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,8 @@ pub struct TankNow {
     pub level_cm: f64,
     /// Spill over the rim in cm³/s.
     pub spill_cm3_s: f64,
+    /// Leak to the floor in cm³/s.
+    pub leak_cm3_s: f64,
 }
 
 /// A pump now.
@@ -97,6 +99,8 @@ pub struct Snapshot {
     pub balance_error_cm3: f64,
     /// Alarms that are on.
     pub alarms: Vec<Alarm>,
+    /// Faults that have been switched on.
+    pub faults: Vec<ActiveFault>,
 }
 
 impl Snapshot {
@@ -120,6 +124,7 @@ impl Snapshot {
             balance: Balance::default(),
             balance_error_cm3: 0.0,
             alarms: vec![],
+            faults: vec![],
         }
     }
 }

@@ -384,6 +384,7 @@ impl Worker {
             balance: plant.map(Plant::balance).unwrap_or_default(),
             balance_error_cm3: self.total_cm3() - self.baseline_cm3,
             alarms: self.alarms.active(),
+            faults: closed.source().faults().to_vec(),
         }
     }
 }
@@ -413,8 +414,13 @@ fn loop_now(l: &crate::sim::ActiveLoop, closed: &ClosedLoop) -> LoopNow {
 }
 
 fn parts(plant: &Plant) -> (Vec<TankNow>, Vec<PumpNow>, Vec<ValveNow>) {
-    let tanks = plant.levels_cm().iter().zip(plant.spill_flows_cm3_s());
-    let tanks = tanks.map(|(&level_cm, &spill_cm3_s)| TankNow { level_cm, spill_cm3_s }).collect();
+    let tanks = (0..plant.levels_cm().len())
+        .map(|i| TankNow {
+            level_cm: plant.levels_cm()[i],
+            spill_cm3_s: plant.spill_flows_cm3_s()[i],
+            leak_cm3_s: plant.leak_flows_cm3_s()[i],
+        })
+        .collect();
     let pumps = (0..plant.inputs().len())
         .map(|i| PumpNow {
             input: plant.inputs()[i],

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use crate::control::{ControlLoop, LoopSpec, Mode, check_filter};
 use crate::daq::{RigControls, SimulatedRig, Source};
-use crate::plant::{Measurement, Network, Reading, ReadingStatus, RigError, SteadyState, steady_at_level};
+use crate::plant::{
+    ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, SteadyState,
+    steady_at_level,
+};
 use crate::session::{CommandError, RigCommand};
 use crate::signal::{ChannelKind, ChannelSet};
 
@@ -160,21 +163,25 @@ impl ClosedLoop {
     }
 
     fn fill_row(&mut self) {
+        let plant = self.source.plant();
+        let of = |values: Option<&[f64]>, i: usize| values.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+        let (levels, inputs) = (plant.map(|p| p.levels_cm()), plant.map(|p| p.inputs()));
+        let (through, angles) = (plant.map(|p| p.valve_flows_cm3_s()), plant.map(|p| p.angles_deg()));
+        let (arriving, spills) =
+            (plant.map(|p| p.arriving_flows_cm3_s()), plant.map(|p| p.spill_flows_cm3_s()));
         for (value, channel) in self.row.iter_mut().zip(&self.channels.channels) {
-            let plant = self.source.plant();
-            let of = |values: Option<&[f64]>, i: usize| values.map_or(f64::NAN, |v| v[i]);
             *value = match channel.kind {
+                ChannelKind::Level(i) => of(levels, i),
+                ChannelKind::Input(i) => of(inputs, i),
+                ChannelKind::Arriving(i) => of(arriving, i),
+                ChannelKind::ValveFlow(i) => of(through, i),
+                ChannelKind::Angle(i) => of(angles, i),
+                ChannelKind::Spill(i) => of(spills, i),
                 ChannelKind::Setpoint(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.setpoint_cm),
                 ChannelKind::Pv(i) => {
                     self.loops.get(i).map_or(f64::NAN, |l| self.readings[l.sensor].level_cm)
                 }
                 ChannelKind::Mv(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.mv()),
-                ChannelKind::Level(i) => of(plant.map(|p| p.levels_cm()), i),
-                ChannelKind::Input(i) => of(plant.map(|p| p.inputs()), i),
-                ChannelKind::Arriving(i) => of(plant.map(|p| p.arriving_flows_cm3_s()), i),
-                ChannelKind::ValveFlow(i) => of(plant.map(|p| p.valve_flows_cm3_s()), i),
-                ChannelKind::Angle(i) => of(plant.map(|p| p.angles_deg()), i),
-                ChannelKind::Spill(i) => of(plant.map(|p| p.spill_flows_cm3_s()), i),
             };
         }
     }
@@ -247,6 +254,12 @@ impl ClosedLoop {
             RigCommand::Measurement { measurement } => {
                 self.source.rig().ok_or(CommandError::NotARig)?.set_measurement(*measurement);
             }
+            RigCommand::Fault { tag, fault } => {
+                self.source.rig().ok_or(CommandError::NotARig)?.set_fault(tag, *fault)?;
+            }
+            RigCommand::Repair { tag, kind } => {
+                self.source.rig().ok_or(CommandError::NotARig)?.repair(tag, *kind)?;
+            }
             RigCommand::Seed { seed } => self.source.rig().ok_or(CommandError::NotARig)?.set_seed(*seed),
         }
         Ok(())
@@ -302,6 +315,15 @@ impl ClosedLoop {
     }
 
     fn settle_at(&mut self, tag: &str, level_cm: f64) -> Result<(), CommandError> {
+        let keeps_from_rest = |f: &&ActiveFault| {
+            matches!(
+                f.fault.kind(),
+                FaultKind::Leak | FaultKind::WeakPump | FaultKind::DryPump | FaultKind::PowerCut
+            )
+        };
+        if let Some(found) = self.source.faults().iter().find(keeps_from_rest) {
+            return Err(CommandError::Faulty { tag: found.tag.clone(), kind: found.fault.kind().key() });
+        }
         let before = self.find(tag)?.control.setpoint_cm;
         self.set_setpoint(tag, level_cm)?;
         if let Err(error) = self.settle_loop(tag, level_cm) {

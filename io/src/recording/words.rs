@@ -57,6 +57,10 @@ fn done(command: &RigCommand) -> String {
             let [noise, quantisation, resolution] = [m.noise, m.quantisation, m.resolution].map(on);
             format!("noise {noise}, quantisation {quantisation}, resolution {resolution}")
         }
+        RigCommand::Fault { tag, fault } => format!("{tag}: fault {}", fault.kind().key()),
+        RigCommand::Repair { tag, kind } => {
+            format!("{tag}: repaired{}", kind.map_or(String::new(), |k| format!(" ({})", k.key())))
+        }
         RigCommand::Seed { seed } => format!("noise from seed {seed}"),
     }
 }
