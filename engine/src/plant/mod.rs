@@ -7,7 +7,9 @@
 mod error;
 mod faults;
 mod flow_law;
-mod integrator;
+mod lanes;
+mod motion;
+mod motions;
 mod names;
 mod network;
 mod pipe;

@@ -1,9 +1,10 @@
 //! The checked tank network: indices instead of names, every number in its range.
 
 use super::error::RigError;
+use super::motions::MOST_PARTS;
 use super::names::check_names;
 use super::spec::{ConfigurationSpec, InputUnit, PumpSpec, RigSpec, SensorSpec, ValveDrive, ValveLaw};
-use super::streams::MOST_TANKS;
+use super::streams::widest;
 
 /// The schema of rig files this version reads.
 pub const RIG_SCHEMA: u32 = 1;
@@ -52,10 +53,23 @@ impl Pump {
     /// Flow in cm³/s for an input: linear between the curve's points, constant outside.
     #[must_use]
     pub fn flow_cm3_s(&self, input: f64) -> f64 {
+        self.flow_near(input, &mut 0)
+    }
+
+    /// As [`Self::flow_cm3_s`], looking first at the piece of the curve where the last input lay.
+    #[inline]
+    pub(super) fn flow_near(&self, input: f64, piece: &mut usize) -> f64 {
+        if let Some([[x0, q0], [x1, q1]]) = self.curve.get(*piece..*piece + 2)
+            && *x0 <= input
+            && input < *x1
+        {
+            return q0 + (q1 - q0) * (input - x0) / (x1 - x0);
+        }
         let after = self.curve.partition_point(|p| p[0] <= input);
         if after == 0 {
             return self.curve[0][1];
         }
+        *piece = after - 1;
         let [x0, q0] = self.curve[after - 1];
         let Some(&[x1, q1]) = self.curve.get(after) else { return q0 };
         q0 + (q1 - q0) * (input - x0) / (x1 - x0)
@@ -157,8 +171,6 @@ impl Network {
         if spec.tanks.is_empty() {
             return Err(RigError::NoTank);
         }
-        let tanks_most = format!("at most {MOST_TANKS}");
-        value(&spec.id, "tanks", spec.tanks.len() as f64, spec.tanks.len() <= MOST_TANKS, tanks_most)?;
         check_names(&spec)?;
         value(&spec.id, "delta_cm", spec.delta_cm, (0.0..=MOST).contains(&spec.delta_cm), "0…1e9")?;
         let sampled = (1e-3..=3600.0).contains(&spec.sample_time_s);
@@ -192,6 +204,9 @@ impl Network {
             reservoir: spec.reservoir.as_deref().map(|r| tank_index(&spec, &spec.id, r)).transpose()?,
             spec,
         };
+        let parts = widest(&network);
+        let expected = format!("at most {MOST_PARTS} tanks, valves and pumps");
+        value(&network.spec.id, "size", parts as f64, parts <= MOST_PARTS, expected)?;
         for configuration in &network.spec.configurations {
             network.check_configuration(configuration)?;
         }

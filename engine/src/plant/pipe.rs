@@ -2,28 +2,30 @@
 
 use std::collections::VecDeque;
 
+use super::lanes::Number;
+
 /// Shorter pieces of stream are merged with their neighbour, in seconds.
 const SHORTEST_S: f64 = 1e-9;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Piece {
+struct Piece<V> {
     duration_s: f64,
-    flow_cm3_s: f64,
+    flow_cm3_s: V,
 }
 
 /// A stream in the air: pieces of constant flow whose durations add up to the delay θ.
 ///
 /// Delivered volume equals entered volume to rounding, whatever the flow and the delay do.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pipe {
+pub(crate) struct Pipe<V> {
     delay_s: f64,
-    pieces: VecDeque<Piece>,
+    pieces: VecDeque<Piece<V>>,
 }
 
-impl Pipe {
+impl<V: Number> Pipe<V> {
     /// A pipe of delay θ in seconds, filled with a constant flow in cm³/s.
     #[must_use]
-    pub fn filled(delay_s: f64, flow_cm3_s: f64) -> Self {
+    pub fn filled(delay_s: f64, flow_cm3_s: V) -> Self {
         let mut pieces = VecDeque::with_capacity(64);
         if delay_s > SHORTEST_S {
             pieces.push_back(Piece { duration_s: delay_s, flow_cm3_s });
@@ -39,7 +41,7 @@ impl Pipe {
 
     /// Flow that arrives now, in cm³/s; `None` without a delay.
     #[must_use]
-    pub fn arriving_cm3_s(&self) -> Option<f64> {
+    pub fn arriving_cm3_s(&self) -> Option<V> {
         self.pieces.front().map(|p| p.flow_cm3_s)
     }
 
@@ -51,8 +53,8 @@ impl Pipe {
 
     /// Water in the air, in cm³.
     #[must_use]
-    pub fn volume_cm3(&self) -> f64 {
-        self.pieces.iter().map(|p| p.duration_s * p.flow_cm3_s).sum()
+    pub fn volume_cm3(&self) -> V {
+        self.pieces.iter().fold(V::of(0.0), |sum, p| sum + p.flow_cm3_s * p.duration_s)
     }
 
     /// Takes `duration_s` of stream off the front, at most [`Self::time_to_change_s`].
@@ -68,14 +70,14 @@ impl Pipe {
             && rest.duration_s != 0.0
             && let Some(next) = self.pieces.front_mut()
         {
-            let volume = rest.duration_s * rest.flow_cm3_s + next.duration_s * next.flow_cm3_s;
+            let volume = rest.flow_cm3_s * rest.duration_s + next.flow_cm3_s * next.duration_s;
             next.duration_s += rest.duration_s;
-            next.flow_cm3_s = volume / next.duration_s;
+            next.flow_cm3_s = volume * (1.0 / next.duration_s);
         }
     }
 
     /// Gives `duration_s` of stream back to the front.
-    pub fn give_back(&mut self, duration_s: f64, flow_cm3_s: f64) {
+    pub fn give_back(&mut self, duration_s: f64, flow_cm3_s: V) {
         match self.pieces.front_mut() {
             Some(front) if front.flow_cm3_s == flow_cm3_s => front.duration_s += duration_s,
             _ => self.pieces.push_front(Piece { duration_s, flow_cm3_s }),
@@ -84,21 +86,17 @@ impl Pipe {
 
     /// Lets a flow in at the back for `duration_s`.
     #[inline]
-    pub fn feed(&mut self, duration_s: f64, flow_cm3_s: f64) {
+    pub fn feed(&mut self, duration_s: f64, flow_cm3_s: V) {
         if self.delay_s <= SHORTEST_S {
             return;
         }
         match self.pieces.back_mut() {
-            Some(back) if (back.flow_cm3_s - flow_cm3_s).abs() <= 1e-14 * flow_cm3_s.abs() => {
-                let volume = back.duration_s * back.flow_cm3_s + duration_s * flow_cm3_s;
-                back.duration_s += duration_s;
-                back.flow_cm3_s = volume / back.duration_s;
-            }
+            Some(back) if back.flow_cm3_s == flow_cm3_s => back.duration_s += duration_s,
             // A last piece whose time is spent holds no more than rounding.
             Some(back) if back.duration_s < SHORTEST_S => {
-                let volume = back.duration_s * back.flow_cm3_s + duration_s * flow_cm3_s;
+                let volume = back.flow_cm3_s * back.duration_s + flow_cm3_s * duration_s;
                 back.duration_s += duration_s;
-                back.flow_cm3_s = volume / back.duration_s;
+                back.flow_cm3_s = volume * (1.0 / back.duration_s);
             }
             _ => self.pieces.push_back(Piece { duration_s, flow_cm3_s }),
         }
@@ -108,24 +106,24 @@ impl Pipe {
     ///
     /// Returns the volume in cm³ that has no place in a pipe without delay and must be delivered at once.
     #[must_use]
-    pub fn set_delay(&mut self, delay_s: f64) -> f64 {
+    pub fn set_delay(&mut self, delay_s: f64) -> V {
         if (delay_s - self.delay_s).abs() < SHORTEST_S {
-            return 0.0;
+            return V::of(0.0);
         }
         let homeless = if delay_s <= SHORTEST_S {
             let volume = self.volume_cm3();
             self.pieces.clear();
             volume
         } else if self.pieces.is_empty() {
-            self.pieces.push_back(Piece { duration_s: delay_s, flow_cm3_s: 0.0 });
-            0.0
+            self.pieces.push_back(Piece { duration_s: delay_s, flow_cm3_s: V::of(0.0) });
+            V::of(0.0)
         } else {
             let ratio = delay_s / self.delay_s;
             for piece in &mut self.pieces {
                 piece.duration_s *= ratio;
-                piece.flow_cm3_s /= ratio;
+                piece.flow_cm3_s = piece.flow_cm3_s * (1.0 / ratio);
             }
-            0.0
+            V::of(0.0)
         };
         self.delay_s = delay_s.max(0.0);
         homeless

@@ -1,36 +1,76 @@
 //! Rims, empty tanks and dry pumps: what a step would take that is not there, or bring that does not fit, is mended
 //! in volumes, so that no water is made or lost.
 
-use super::state::Plant;
+use super::motion::{Motion, NO_TIME_S};
+use super::network::Network;
+use super::pipe::Pipe;
 use super::streams::Streams;
 
+/// Longest step near a rim or an empty tank, in seconds.
+const CAREFUL_STEP_S: f64 = 0.1;
 /// Share of a tank by which rounding may leave it below empty.
 const EMPTY_SHARE: f64 = 1e-12;
 
-impl Plant {
-    /// Moves the volumes of a step of `step_s` from `work.start` to `work.end`, mended until every tank can hold
-    /// and give them. `fed` pumps have had their water.
-    pub(super) fn mend(&mut self, step_s: f64, fed: bool) {
-        let work = &mut self.work;
-        for (i, &flow) in self.commanded.iter().enumerate() {
-            work.pumped_volume[i] = if fed { 0.0 } else { step_s * flow };
-            work.arriving_volume[i] = step_s * work.arriving[i];
+/// Volumes of a step in cm³ while they are mended.
+#[derive(Debug)]
+struct Volumes<const N: usize> {
+    pumped: [f64; N],
+    arriving: [f64; N],
+    spilled: [f64; N],
+    /// What every node holds after the step.
+    after: [f64; N],
+}
+
+impl<const N: usize> Motion<N, f64> {
+    /// Lets `duration_s` pass in short steps that end with it, minding rims and empty tanks. `fed` pumps have had
+    /// their water; `dry` tells which of the others found none.
+    pub fn advance_carefully(&mut self, network: &Network, duration_s: f64, fed: bool, dry: &mut [bool]) {
+        self.cut();
+        let mut left_s = duration_s;
+        while left_s > NO_TIME_S {
+            let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(left_s, f64::min);
+            left_s -= self.careful_step(network, change_s, fed, dry);
         }
-        work.spill_volume.fill(0.0);
-        let tanks = self.network.tanks.len();
-        for _ in 0..=2 * tanks {
-            self.sum_volumes();
+    }
+
+    fn careful_step(&mut self, network: &Network, most_s: f64, fed: bool, dry: &mut [bool]) -> f64 {
+        let mut step_s = self.prepare_step(most_s.min(CAREFUL_STEP_S));
+        let (start, mut slope) = (self.start, self.start_slope);
+        self.hold_at_rims(&start, &mut slope);
+        if slope != self.start_slope {
+            // A tank held at its rim does not hurry.
+            self.start_slope = slope;
+            let most_s = most_s.min(CAREFUL_STEP_S);
+            step_s = self.length_for(most_s);
+        }
+        self.runge_kutta::<true>(step_s);
+        self.mend(network, step_s, fed, dry);
+        self.evaluate_end();
+        (self.length_s, self.passed_s) = (0.0, 0.0);
+        self.steps += 1;
+        step_s
+    }
+
+    /// Moves the volumes of a step from start to end, mended until every tank can hold and give them.
+    fn mend(&mut self, network: &Network, step_s: f64, fed: bool, dry: &mut [bool]) {
+        let mut volumes =
+            Volumes { pumped: [0.0; N], arriving: [0.0; N], spilled: [0.0; N], after: [0.0; N] };
+        for i in 0..network.pumps.len() {
+            volumes.pumped[i] = if fed { 0.0 } else { step_s * self.commanded[i] };
+            volumes.arriving[i] = step_s * self.arriving[i];
+        }
+        for _ in 0..=2 * network.tanks.len() {
+            self.sum(network, &mut volumes);
             let mut mended = false;
-            for i in 0..tanks {
-                let tank = &self.network.tanks[i];
-                let (most, volume) = (tank.height_cm * tank.area_cm2, self.work.after[i]);
+            for (i, tank) in network.tanks.iter().enumerate() {
+                let (most, volume) = (tank.height_cm * tank.area_cm2, volumes.after[i]);
                 if volume < -EMPTY_SHARE * most {
-                    self.scale_outflows(i, volume);
+                    self.scale_outflows(network, &mut volumes, i, dry);
                     mended = true;
                     break;
                 }
                 if volume > most * (1.0 + 1e-15) {
-                    self.work.spill_volume[i] += volume - most;
+                    volumes.spilled[i] += volume - most;
                     mended = true;
                     break;
                 }
@@ -39,90 +79,85 @@ impl Plant {
                 break;
             }
         }
-        self.book(step_s, fed);
+        self.book(network, &volumes, step_s, fed);
     }
 
-    /// What every node holds after the step, in cm³.
-    fn sum_volumes(&mut self) {
-        let (work, outside) = (&mut self.work, self.streams.outside());
-        for (i, after) in work.after.iter_mut().enumerate() {
-            let area = self.network.tanks.get(i).map_or(1.0, |tank| tank.area_cm2);
-            *after = work.start[i] * area;
+    fn sum(&self, network: &Network, volumes: &mut Volumes<N>) {
+        let outside = self.streams.outside();
+        volumes.after = self.start;
+        for (i, tank) in network.tanks.iter().enumerate() {
+            volumes.after[i] *= tank.area_cm2;
         }
-        for (i, tank) in self.network.tanks.iter().enumerate() {
-            work.after[i] -= work.spill_volume[i];
-            work.after[tank.spills_to.unwrap_or(outside)] += work.spill_volume[i];
+        for (i, tank) in network.tanks.iter().enumerate() {
+            volumes.after[i] -= volumes.spilled[i];
+            volumes.after[tank.spills_to.unwrap_or(outside)] += volumes.spilled[i];
         }
-        for (i, pump) in self.network.pumps.iter().enumerate() {
-            work.after[pump.from.unwrap_or(outside)] -= work.pumped_volume[i];
-            for &(to, share) in &pump.outlets {
-                work.after[to] += share * work.arriving_volume[i];
+        for (i, feed) in self.feeds.iter().enumerate() {
+            volumes.after[feed.source] -= volumes.pumped[i];
+            for &(to, share) in &feed.outlets {
+                volumes.after[to] += share * volumes.arriving[i];
             }
         }
         for i in 0..self.streams.len() {
             let (from, to) = self.streams.ends(i);
-            work.after[from] -= work.volume[i];
-            work.after[to] += work.volume[i];
+            volumes.after[from] -= self.volume[i];
+            volumes.after[to] += self.volume[i];
         }
     }
 
     /// Shrinks everything that leaves an over-drawn tank so that it ends the step empty.
-    fn scale_outflows(&mut self, tank: usize, after_cm3: f64) {
-        let (work, network) = (&mut self.work, &self.network);
-        let leaves = |streams: &Streams, i: usize, volume: f64| {
+    fn scale_outflows(&mut self, network: &Network, volumes: &mut Volumes<N>, tank: usize, dry: &mut [bool]) {
+        let leaves = |streams: &Streams<N, f64>, i: usize, volume: f64| {
             let (from, to) = streams.ends(i);
             (from == tank && volume > 0.0) || (to == tank && volume < 0.0)
         };
-        let mut out = work.spill_volume[tank];
+        let mut out = volumes.spilled[tank];
         for (i, pump) in network.pumps.iter().enumerate() {
             if pump.from == Some(tank) {
-                out += work.pumped_volume[i];
+                out += volumes.pumped[i];
             }
         }
         for i in 0..self.streams.len() {
-            if leaves(&self.streams, i, work.volume[i]) {
-                out += work.volume[i].abs();
+            if leaves(&self.streams, i, self.volume[i]) {
+                out += self.volume[i].abs();
             }
         }
-        let keep = ((out + after_cm3) / out).max(0.0);
-        work.spill_volume[tank] *= keep;
+        let keep = ((out + volumes.after[tank]) / out).max(0.0);
+        volumes.spilled[tank] *= keep;
         for (i, pump) in network.pumps.iter().enumerate() {
             if pump.from == Some(tank) && self.commanded[i] > 0.0 {
-                work.pumped_volume[i] *= keep;
-                self.dry[i] = true;
+                volumes.pumped[i] *= keep;
+                dry[i] = true;
                 if self.pipes[i].arriving_cm3_s().is_none() {
-                    work.arriving_volume[i] *= keep;
+                    volumes.arriving[i] *= keep;
                 }
             }
         }
         for i in 0..self.streams.len() {
-            if leaves(&self.streams, i, work.volume[i]) {
-                work.volume[i] *= keep;
+            if leaves(&self.streams, i, self.volume[i]) {
+                self.volume[i] *= keep;
             }
         }
     }
 
-    fn book(&mut self, step_s: f64, fed: bool) {
-        let work = &mut self.work;
-        for (i, (end, after)) in work.end.iter_mut().zip(&work.after).enumerate() {
-            *end = match self.network.tanks.get(i) {
-                Some(tank) => (after / tank.area_cm2).clamp(0.0, tank.height_cm),
-                None => *after,
-            };
-        }
-        for (span, volume) in work.span_spills.iter_mut().zip(&work.spill_volume) {
-            *span += volume;
+    fn book(&mut self, network: &Network, volumes: &Volumes<N>, step_s: f64, fed: bool) {
+        self.end = volumes.after;
+        for (level, tank) in self.end.iter_mut().zip(&network.tanks) {
+            *level = (*level / tank.area_cm2).clamp(0.0, tank.height_cm);
         }
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
             if !fed {
-                pipe.feed(step_s, work.pumped_volume[i] / step_s);
-                work.span_pumped[i] += work.pumped_volume[i];
+                let whole = step_s * self.commanded[i];
+                let pumped = volumes.pumped[i];
+                pipe.feed(step_s, if pumped == whole { self.commanded[i] } else { pumped / step_s });
+                self.span_pumped[i] += pumped;
             }
             pipe.take(step_s);
-            work.span_arriving[i] += work.arriving_volume[i];
+            self.span_arriving[i] += volumes.arriving[i];
         }
-        for (span, volume) in work.span_volume.iter_mut().zip(&work.volume[..self.streams.len()]) {
-            *span += volume;
+        for i in 0..N {
+            self.span_volume[i] += self.volume[i];
+            self.span_spills[i] += volumes.spilled[i];
         }
     }
 }

@@ -1,11 +1,11 @@
-//! The moving part of the plant: levels, streams in the air and the integrator.
+//! A rig in motion: what can be set and seen of it.
 
 use super::error::RigError;
 use super::faults::Fault;
-use super::integrator::Work;
+use super::motions::Motions;
 use super::network::Network;
 use super::pipe::Pipe;
-use super::streams::{Origin, Streams};
+use super::streams::Origin;
 
 /// Where the water is, in cm³.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -31,34 +31,29 @@ impl Balance {
 /// A rig in motion.
 #[derive(Debug, Clone)]
 pub struct Plant {
-    pub(super) network: std::sync::Arc<Network>,
-    pub(super) levels_cm: Vec<f64>,
-    pub(super) inputs: Vec<f64>,
-    /// Flow of each pump at its input, looked up once for each new input.
-    pub(super) commanded: Vec<f64>,
-    pub(super) angles_deg: Vec<f64>,
+    network: std::sync::Arc<Network>,
+    motion: Motions,
+    levels_cm: Vec<f64>,
+    inputs: Vec<f64>,
+    /// Piece of each pump's curve where its input lay last.
+    pieces: Vec<usize>,
+    angles_deg: Vec<f64>,
     /// k of each valve as it is, clogged or not.
-    pub(super) coefficients: Vec<f64>,
-    pub(super) pipes: Vec<Pipe>,
-    pub(super) streams: Streams,
-    /// Steps may reach beyond the present: all that arrives until then is in the air already.
-    pub(super) look_ahead: bool,
+    coefficients: Vec<f64>,
     /// Share of k left in each valve, k of each tank's leak, share of its flow left to each pump.
     clogged: Vec<f64>,
     leaks: Vec<f64>,
     strength: Vec<f64>,
-    pub(super) airlocked: Vec<bool>,
+    airlocked: Vec<bool>,
     /// Without power: each pump, and the rig.
     unpowered: Vec<bool>,
     blackout: bool,
-    pub(super) valve_flows: Vec<f64>,
-    pub(super) leak_flows: Vec<f64>,
-    pub(super) pumped_flows: Vec<f64>,
-    pub(super) arriving_flows: Vec<f64>,
-    pub(super) spill_flows: Vec<f64>,
-    pub(super) dry: Vec<bool>,
-    pub(super) steps: u64,
-    pub(super) work: Work,
+    valve_flows: Vec<f64>,
+    leak_flows: Vec<f64>,
+    pumped_flows: Vec<f64>,
+    arriving_flows: Vec<f64>,
+    spill_flows: Vec<f64>,
+    dry: Vec<bool>,
 }
 
 impl Plant {
@@ -72,19 +67,15 @@ impl Plant {
         let zeros = |n: usize| vec![0.0; n];
         let coefficients: Vec<f64> =
             network.valves.iter().zip(&spec.valves).map(|(v, s)| v.coefficient(s.angle_deg)).collect();
-        let commanded: Vec<f64> =
-            spec.pumps.iter().zip(&network.pumps).map(|(s, p)| p.flow_cm3_s(s.initial)).collect();
-        let streams = Streams::new(&network, &coefficients, &zeros(tanks));
-        let nodes = streams.nodes();
+        let flows = spec.pumps.iter().zip(&network.pumps).map(|(s, p)| (s, p.flow_cm3_s(s.initial)));
+        let pipes = flows.map(|(s, flow)| Pipe::filled(s.delay_s, flow)).collect();
         let mut plant = Self {
+            motion: Motions::new(&network, &coefficients, pipes),
             levels_cm: spec.tanks.iter().map(|t| t.initial_cm).collect(),
+            pieces: vec![0; pumps],
             inputs: spec.pumps.iter().map(|p| p.initial).collect(),
             angles_deg: spec.valves.iter().map(|v| v.angle_deg).collect(),
-            pipes: spec.pumps.iter().zip(&commanded).map(|(s, &q)| Pipe::filled(s.delay_s, q)).collect(),
-            commanded,
             coefficients,
-            streams,
-            look_ahead: false,
             clogged: vec![1.0; valves],
             leaks: zeros(tanks),
             strength: vec![1.0; pumps],
@@ -97,15 +88,37 @@ impl Plant {
             arriving_flows: zeros(pumps),
             spill_flows: zeros(tanks),
             dry: vec![false; pumps],
-            steps: 0,
-            work: Work::new(nodes, tanks, pumps, valves + tanks),
             network,
         };
-        plant.take_levels();
+        for pump in 0..pumps {
+            plant.command(pump);
+        }
         plant.fill_reservoir()?;
-        plant.restream();
         plant.refresh_flows();
         Ok(plant)
+    }
+
+    /// Lets `duration_s` pass with constant inputs. Flows afterwards are the means over `duration_s`.
+    pub fn advance(&mut self, duration_s: f64) {
+        self.dry.copy_from_slice(&self.airlocked);
+        self.motion.advance(&self.network, duration_s, &mut self.levels_cm, &mut self.dry);
+        let span = self.motion.span();
+        let per_s = 1.0 / duration_s;
+        for (origin, volume) in span.origins.iter().zip(span.streams) {
+            match *origin {
+                Origin::Valve(valve) => self.valve_flows[valve] = volume * per_s,
+                Origin::Leak(tank) => self.leak_flows[tank] = volume * per_s,
+            }
+        }
+        for (flow, volume) in self.pumped_flows.iter_mut().zip(span.pumped) {
+            *flow = volume * per_s;
+        }
+        for (flow, volume) in self.arriving_flows.iter_mut().zip(span.arriving) {
+            *flow = volume * per_s;
+        }
+        for (flow, volume) in self.spill_flows.iter_mut().zip(span.spills) {
+            *flow = volume * per_s;
+        }
     }
 
     /// The structure.
@@ -176,30 +189,21 @@ impl Plant {
 
     /// Transport delays in seconds.
     pub fn delays_s(&self) -> impl Iterator<Item = f64> + '_ {
-        self.pipes.iter().map(Pipe::delay_s)
+        self.motion.pipes().iter().map(Pipe::delay_s)
     }
 
     /// Steps of the integrator since the start.
     #[must_use]
     pub fn steps(&self) -> u64 {
-        self.steps
+        self.motion.steps()
     }
 
     /// Where the water is.
     #[must_use]
     pub fn balance(&self) -> Balance {
         let tanks_cm3 = self.levels_cm.iter().zip(&self.network.tanks).map(|(h, t)| h * t.area_cm2).sum();
-        let ahead_s = self.work.length_s - self.work.passed_s;
-        let delayed = self.pipes.iter().zip(&self.work.arriving).filter(|(pipe, _)| pipe.delay_s() > 0.0);
-        // What the present step has taken out of the air beyond the present is still there.
-        let in_flight_cm3 =
-            delayed.map(|(pipe, arriving)| pipe.volume_cm3() + ahead_s * arriving).sum::<f64>();
-        Balance {
-            tanks_cm3,
-            in_flight_cm3,
-            outside_cm3: self.work.present(self.streams.outside()),
-            leaked_cm3: self.work.present(self.streams.floor()),
-        }
+        let (outside_cm3, leaked_cm3) = self.motion.lost_cm3();
+        Balance { tanks_cm3, in_flight_cm3: self.motion.in_flight_cm3(), outside_cm3, leaked_cm3 }
     }
 
     /// Sets a pump's input, clamped to its range.
@@ -243,7 +247,6 @@ impl Plant {
     }
 
     fn turn(&mut self, valve: usize) {
-        self.cut();
         let sound = self.network.valves[valve].coefficient(self.angles_deg[valve]);
         self.coefficients[valve] = self.clogged[valve] * sound;
         self.restream();
@@ -252,29 +255,18 @@ impl Plant {
     /// Flow of a pump at its present input and health.
     fn command(&mut self, pump: usize) {
         let stands = self.blackout || self.unpowered[pump] || self.airlocked[pump];
-        let sound = self.network.pumps[pump].flow_cm3_s(self.inputs[pump]);
-        let flow = if stands { 0.0 } else { self.strength[pump] * sound };
-        if flow != self.commanded[pump] && !self.look_ahead {
-            self.cut();
-        }
-        self.commanded[pump] = flow;
+        let sound = self.network.pumps[pump].flow_near(self.inputs[pump], &mut self.pieces[pump]);
+        self.motion.command(pump, if stands { 0.0 } else { self.strength[pump] * sound });
     }
 
-    /// Makes the list of open streams anew, at the present.
     fn restream(&mut self) {
-        self.streams.collect(&self.network, &self.coefficients, &self.leaks);
+        self.motion.collect(&self.network, &self.coefficients, &self.leaks);
         self.valve_flows.fill(0.0);
         self.leak_flows.fill(0.0);
-        let drives = |tank: usize| (0..self.streams.len()).any(|i| self.streams.is_driven_by(i, tank));
-        let early = |pump: &super::network::Pump| pump.from.is_none_or(|tank| !drives(tank));
-        self.look_ahead =
-            self.network.pumps.iter().all(early) && self.pipes.iter().all(|p| p.delay_s() > 0.0);
-        self.evaluate_end();
     }
 
     /// Water from `tank` to the floor, `q = k √h`; k in cm^2.5/s, 0 for none.
     pub(crate) fn set_leak(&mut self, tank: usize, k: f64) {
-        self.cut();
         self.leaks[tank] = k;
         self.restream();
     }
@@ -299,23 +291,21 @@ impl Plant {
     /// Takes the power from everything, or gives it back.
     pub(crate) fn set_blackout(&mut self, on: bool) {
         self.blackout = on;
-        for pump in 0..self.commanded.len() {
+        for pump in 0..self.inputs.len() {
             self.command(pump);
         }
     }
 
     /// Changes a pump's transport delay; the water in the air stays counted.
     pub fn set_delay(&mut self, pump: usize, delay_s: f64) {
-        self.cut();
-        let homeless_cm3 = self.pipes[pump].set_delay(delay_s);
+        let homeless_cm3 = self.motion.change_pipes(|pipes| pipes[pump].set_delay(delay_s));
         if homeless_cm3 > 0.0 {
             for outlet in 0..self.network.pumps[pump].outlets.len() {
                 let (to, share) = self.network.pumps[pump].outlets[outlet];
                 self.pour(to, share * homeless_cm3);
             }
+            self.motion.set_levels(&self.levels_cm);
         }
-        self.take_levels();
-        self.restream();
     }
 
     /// Adds `delta_cm` to a tank's level, taking the water from the reservoir (or the outside); what
@@ -333,8 +323,8 @@ impl Plant {
                 expected: "finite".to_owned(),
             });
         }
-        self.cut();
-        let tanks = &self.network.tanks;
+        let network = self.network.clone();
+        let tanks = &network.tanks;
         let wanted = (self.levels_cm[tank] + delta_cm).clamp(0.0, tanks[tank].height_cm);
         let mut volume_cm3 = (wanted - self.levels_cm[tank]) * tanks[tank].area_cm2;
         match self.network.reservoir.filter(|&r| r != tank) {
@@ -345,11 +335,11 @@ impl Plant {
                 let left_cm = self.levels_cm[r] - volume_cm3 / tanks[r].area_cm2;
                 self.levels_cm[r] = left_cm.clamp(0.0, tanks[r].height_cm);
             }
-            None => self.work.end[self.streams.outside()] -= volume_cm3,
+            None => self.lose(-volume_cm3),
         }
         let change_cm = volume_cm3 / tanks[tank].area_cm2;
         self.levels_cm[tank] = (self.levels_cm[tank] + change_cm).clamp(0.0, tanks[tank].height_cm);
-        self.take_levels();
+        self.motion.set_levels(&self.levels_cm);
         Ok(change_cm)
     }
 
@@ -359,19 +349,20 @@ impl Plant {
     /// # Errors
     /// [`RigError::Water`] when the water does not fit.
     pub fn set_state(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), RigError> {
-        self.cut();
-        let before = (
-            (self.levels_cm.clone(), self.inputs.clone(), self.commanded.clone()),
-            (self.pipes.clone(), self.work.end.clone()),
-        );
+        let before = (self.levels_cm.clone(), self.inputs.clone(), self.motion.clone());
         self.levels_cm.copy_from_slice(levels_cm);
         self.inputs.copy_from_slice(inputs);
-        for i in 0..self.pipes.len() {
-            self.command(i);
-            self.pipes[i] = Pipe::filled(self.pipes[i].delay_s(), self.commanded[i]);
+        for pump in 0..inputs.len() {
+            self.command(pump);
         }
+        let flows = self.motion.commanded().to_vec();
+        self.motion.change_pipes(|pipes| {
+            for (pipe, flow) in pipes.iter_mut().zip(flows) {
+                *pipe = Pipe::filled(pipe.delay_s(), flow);
+            }
+        });
         if let Err(error) = self.fill_reservoir() {
-            ((self.levels_cm, self.inputs, self.commanded), (self.pipes, self.work.end)) = before;
+            (self.levels_cm, self.inputs, self.motion) = before;
             return Err(error);
         }
         self.refresh_flows();
@@ -388,18 +379,16 @@ impl Plant {
                 return Err(RigError::Water { tank: self.network.spec.tanks[r].id.clone(), level_cm });
             }
             self.levels_cm[r] = level_cm;
-            let (outside, floor) = (self.streams.outside(), self.streams.floor());
-            self.work.end[outside] = 0.0;
-            self.work.end[floor] = 0.0;
+            self.motion.set_lost_cm3(0.0, 0.0);
         }
-        self.take_levels();
+        self.motion.set_levels(&self.levels_cm);
         Ok(())
     }
 
-    /// The integrator goes on from the levels as they are now.
-    fn take_levels(&mut self) {
-        self.work.end[..self.levels_cm.len()].copy_from_slice(&self.levels_cm);
-        self.evaluate_end();
+    /// Books water that goes to the outside.
+    fn lose(&mut self, volume_cm3: f64) {
+        let (outside, floor) = self.motion.lost_cm3();
+        self.motion.set_lost_cm3(outside + volume_cm3, floor);
     }
 
     fn pour(&mut self, tank: usize, volume_cm3: f64) {
@@ -413,24 +402,26 @@ impl Plant {
                     let o = &self.network.tanks[other];
                     let filled = self.levels_cm[other] + excess / o.area_cm2;
                     self.levels_cm[other] = filled.min(o.height_cm);
-                    self.work.end[self.streams.outside()] += (filled - o.height_cm).max(0.0) * o.area_cm2;
+                    let excess = (filled - o.height_cm).max(0.0) * o.area_cm2;
+                    self.lose(excess);
                 }
-                None => self.work.end[self.streams.outside()] += excess,
+                None => self.lose(excess),
             }
         }
     }
 
     /// Flows as they are at the present state, for a display before the first step.
     fn refresh_flows(&mut self) {
-        for (i, origin) in self.streams.origins.iter().enumerate() {
+        let (flows, origins) = self.motion.flows();
+        for (origin, &flow) in origins.iter().zip(flows) {
             match *origin {
-                Origin::Valve(valve) => self.valve_flows[valve] = self.work.end_flow[i],
-                Origin::Leak(tank) => self.leak_flows[tank] = self.work.end_flow[i],
+                Origin::Valve(valve) => self.valve_flows[valve] = flow,
+                Origin::Leak(tank) => self.leak_flows[tank] = flow,
             }
         }
-        for i in 0..self.commanded.len() {
-            self.pumped_flows[i] = self.commanded[i];
-            self.arriving_flows[i] = self.pipes[i].arriving_cm3_s().unwrap_or(self.pumped_flows[i]);
+        for (i, pipe) in self.motion.pipes().iter().enumerate() {
+            self.pumped_flows[i] = self.motion.commanded()[i];
+            self.arriving_flows[i] = pipe.arriving_cm3_s().unwrap_or(self.pumped_flows[i]);
         }
         self.spill_flows.fill(0.0);
     }

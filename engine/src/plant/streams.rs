@@ -1,22 +1,25 @@
 //! The open streams of a rig, flat: what the integrator evaluates a few times a sample.
 //!
 //! Nodes are numbered: the tanks in the order of the file, then the outside, then the floor (where leaks go),
-//! then a level of 0 cm that a free fall drives against.
+//! then a level of 0 cm that a free fall drives against. Every array over nodes, streams or pumps has the same
+//! length `N`, a power of two with room for each of them, so that the compiler knows it.
 
+use super::lanes::Number;
 use super::network::Network;
 use super::spec::{ValveDrive, ValveLaw};
 
-/// Below this r² in cm², √r is taken of it instead: with δ = 0 a head of 0 has flow 0, not 0/0.
+/// δ² in cm² where δ = 0, so that a head of 0 has flow 0, not 0/0.
 const TINY_CM2: f64 = 1e-300;
+/// Nodes that are not tanks: the outside, the floor, the level of 0 cm.
+const EXTRA: usize = 3;
 
-/// Lengths that arrays over the nodes are padded to, so that the compiler knows them: powers of two.
-pub(super) const LENGTHS: [usize; 4] = [8, 16, 64, 1024];
+/// Up to this length a whole column is quicker than single nodes.
+const SHORT: usize = 16;
 
-/// Most tanks of a rig: there are three nodes more.
-pub(super) const MOST_TANKS: usize = LENGTHS[3] - 3;
-
-fn padded(nodes: usize) -> usize {
-    LENGTHS.into_iter().find(|&length| length >= nodes).unwrap_or(nodes)
+/// How many nodes, streams or pumps a rig has at most, whichever are more.
+pub(crate) fn widest(network: &Network) -> usize {
+    let tanks = network.tanks.len();
+    (tanks + EXTRA).max(network.valves.len() + tanks + 1).max(network.pumps.len())
 }
 
 /// Where a stream comes from.
@@ -29,43 +32,53 @@ pub(super) enum Origin {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Stream {
+struct Stream<V> {
     from: usize,
     /// Node whose level works against that of `from`.
     against: usize,
     to: usize,
-    k: f64,
+    k: V,
     /// Lowest head that drives it: 0 for a free fall, −∞ between two tanks.
     least: f64,
     /// 1/A of `from` plus that of `against`, in cm⁻².
-    conductance: f64,
+    conductance: V,
+    /// Laminar; these come last.
+    linear: bool,
+    /// Its place in arrays over streams.
+    slot: usize,
 }
 
 /// Every stream that is not shut.
 #[derive(Debug, Clone)]
-pub(super) struct Streams {
-    /// Square roots first.
-    streams: Vec<Stream>,
-    roots: usize,
+pub(crate) struct Streams<const N: usize, V> {
+    /// Square roots first; an odd number is filled up with one that never flows.
+    streams: Vec<Stream<V>>,
+    laminar: bool,
+    /// dh/dt that a flow of 1 cm³/s of each stream brings every node, in cm⁻². Multiplying by whole columns is
+    /// quicker than adding to single nodes, as long as they are short.
+    columns: Vec<[V; N]>,
     /// What each stream belongs to.
-    pub origins: Vec<Origin>,
+    pub(super) origins: Vec<Origin>,
     delta2: f64,
     /// 1/A of each node in cm⁻²; 1 for outside and floor, whose "level" is then a volume in cm³; 0 beyond.
-    pub per_area: Vec<f64>,
+    pub(super) per_area: [V; N],
     tanks: usize,
 }
 
-impl Streams {
+impl<const N: usize, V: Number> Streams<N, V> {
     /// The streams of a network with their coefficients: k(α) of every valve, k of every tank's leak.
-    pub fn new(network: &Network, coefficients: &[f64], leaks: &[f64]) -> Self {
+    pub fn new(network: &Network, areas_cm2: &[V], coefficients: &[V], leaks: &[V]) -> Self {
         let tanks = network.tanks.len();
-        let mut per_area: Vec<f64> = network.tanks.iter().map(|t| 1.0 / t.area_cm2).collect();
-        per_area.extend([1.0, 1.0, 0.0]);
-        per_area.resize(padded(per_area.len()), 0.0);
+        let mut per_area = [V::of(0.0); N];
+        for (per_area, &area) in per_area.iter_mut().zip(areas_cm2) {
+            *per_area = V::of(1.0) / area;
+        }
+        per_area[tanks..tanks + 2].fill(V::of(1.0));
         let mut made = Self {
-            streams: Vec::with_capacity(network.valves.len() + tanks),
-            roots: 0,
-            origins: Vec::with_capacity(network.valves.len() + tanks),
+            streams: Vec::with_capacity(network.valves.len() + tanks + 1),
+            laminar: false,
+            columns: Vec::with_capacity(network.valves.len() + tanks + 1),
+            origins: Vec::with_capacity(network.valves.len() + tanks + 1),
             delta2: (network.delta_cm * network.delta_cm).max(TINY_CM2),
             per_area,
             tanks,
@@ -75,22 +88,27 @@ impl Streams {
     }
 
     /// Takes new coefficients over; allocates nothing.
-    pub fn collect(&mut self, network: &Network, coefficients: &[f64], leaks: &[f64]) {
+    pub fn collect(&mut self, network: &Network, coefficients: &[V], leaks: &[V]) {
+        self.laminar = false;
         self.streams.clear();
+        self.columns.clear();
         self.origins.clear();
         self.valves(network, coefficients, ValveLaw::SquareRoot);
         for (tank, &k) in leaks.iter().enumerate() {
-            if k > 0.0 {
+            if k.largest() > 0.0 {
                 self.push(tank, self.zero(), self.floor(), k, Origin::Leak(tank));
             }
         }
-        self.roots = self.streams.len();
+        self.laminar = true;
         self.valves(network, coefficients, ValveLaw::Laminar);
+        if !self.streams.len().is_multiple_of(2) {
+            self.push_stream(self.zero(), self.zero(), self.zero(), V::of(0.0));
+        }
     }
 
-    fn valves(&mut self, network: &Network, coefficients: &[f64], law: ValveLaw) {
+    fn valves(&mut self, network: &Network, coefficients: &[V], law: ValveLaw) {
         for (i, (valve, &k)) in network.valves.iter().zip(coefficients).enumerate() {
-            if k > 0.0 && valve.law == law {
+            if k.largest() > 0.0 && valve.law == law {
                 let against = match (valve.drive, valve.to) {
                     (ValveDrive::Between, Some(to)) => to,
                     _ => self.zero(),
@@ -100,21 +118,25 @@ impl Streams {
         }
     }
 
-    fn push(&mut self, from: usize, against: usize, to: usize, k: f64, origin: Origin) {
+    fn push(&mut self, from: usize, against: usize, to: usize, k: V, origin: Origin) {
+        self.origins.push(origin);
+        self.push_stream(from, against, to, k);
+    }
+
+    fn push_stream(&mut self, from: usize, against: usize, to: usize, k: V) {
         let conductance = self.per_area[from] + self.per_area[against];
         let least = if against == self.zero() { 0.0 } else { f64::NEG_INFINITY };
-        self.streams.push(Stream { from, against, to, k, least, conductance });
-        self.origins.push(origin);
+        let mut column = [V::of(0.0); N];
+        column[from] -= self.per_area[from];
+        column[to] += self.per_area[to];
+        self.columns.push(column);
+        let (linear, slot) = (self.laminar, self.streams.len());
+        self.streams.push(Stream { from, against, to, k, least, conductance, linear, slot });
     }
 
     /// Number of open streams.
     pub fn len(&self) -> usize {
-        self.streams.len()
-    }
-
-    /// Length of every array over the nodes: their number, padded.
-    pub fn nodes(&self) -> usize {
-        self.per_area.len()
+        self.origins.len()
     }
 
     /// Node of everything outside the rig.
@@ -132,67 +154,97 @@ impl Streams {
     }
 
     /// Ends of a stream.
+    #[inline(always)]
     pub fn ends(&self, stream: usize) -> (usize, usize) {
         (self.streams[stream].from, self.streams[stream].to)
     }
 
-    /// Whether a stream depends on a tank's level.
-    pub fn is_driven_by(&self, stream: usize, tank: usize) -> bool {
-        let s = &self.streams[stream];
-        s.from == tank || s.against == tank
+    /// Whether any stream depends on a tank's level.
+    pub fn drives(&self, tank: usize) -> bool {
+        self.streams.iter().any(|s| s.from == tank || s.against == tank)
     }
 
-    /// Flow of every stream in cm³/s, handed to `each` with its number; gives what they bring each node in cm³/s.
+    /// Adds `weight` times the flow of every stream in cm³/s to `sum`; gives `base`, a dh/dt in cm/s, with what they
+    /// bring every node.
     ///
-    /// `N`, a power of two, is the length of the padded levels. With `GUARD` nothing falls out of a tank that a
-    /// stage of a step has taken below its floor.
+    /// With `GUARD` nothing falls out of a tank that a stage of a step has taken below its floor.
     #[inline(always)]
-    pub fn evaluate<const N: usize, const GUARD: bool>(
+    pub fn evaluate<const GUARD: bool>(
         &self,
-        levels: &[f64; N],
-        mut each: impl FnMut(usize, f64),
-    ) -> [f64; N] {
-        let mut net = [0.0; N];
-        for (i, stream) in self.streams.iter().enumerate() {
-            // Nodes are below N; the mask says so to the compiler.
-            let (from, against, to) = (stream.from & (N - 1), stream.against & (N - 1), stream.to & (N - 1));
-            let head = levels[from] - levels[against];
-            let head = if GUARD { head.max(stream.least) } else { head };
-            let flow = if i < self.roots {
-                stream.k * head / (head * head + self.delta2).sqrt().sqrt()
+        levels: &[V; N],
+        base: &[V; N],
+        weight: f64,
+        sum: &mut [V; N],
+    ) -> [V; N] {
+        let mut slope = *base;
+        // Two at a time: half as many vector roots. Padding closes an odd number.
+        for (pair, columns) in self.streams.as_chunks::<2>().0.iter().zip(self.columns.as_chunks::<2>().0) {
+            let head = pair.each_ref().map(|s| levels[s.from & (N - 1)] - levels[s.against & (N - 1)]);
+            let head = if GUARD { [0, 1].map(|i| head[i].at_least(pair[i].least)) } else { head };
+            let r = head.map(|h| h * h + V::of(self.delta2)).map(V::sqrt).map(V::sqrt);
+            let through = [0, 1].map(|i| pair[i].k * head[i]);
+            let flow = [0, 1].map(|i| through[i] / r[i]);
+            let flow = if pair[1].linear {
+                [0, 1].map(|i| if pair[i].linear { through[i] } else { flow[i] })
             } else {
-                stream.k * head
+                flow
             };
-            each(i, flow);
-            net[from] -= flow;
-            net[to] += flow;
+            for i in [0, 1] {
+                sum[pair[i].slot & (N - 1)] += flow[i] * weight;
+                self.add(&pair[i], &columns[i], flow[i], &mut slope);
+            }
         }
-        net
+        slope
+    }
+
+    /// Adds what a stream's flow, or volume, brings every node.
+    #[inline(always)]
+    fn add(&self, stream: &Stream<V>, column: &[V; N], flow: V, nodes: &mut [V; N]) {
+        if N <= SHORT {
+            for (node, &share) in nodes.iter_mut().zip(column) {
+                *node += share * flow;
+            }
+        } else {
+            nodes[stream.from] += column[stream.from] * flow;
+            if stream.to != stream.from {
+                nodes[stream.to] += column[stream.to] * flow;
+            }
+        }
+    }
+
+    /// Adds what the streams' volumes bring every node, in cm.
+    #[inline(always)]
+    pub fn move_volumes(&self, volumes: &[V; N], levels: &mut [V; N]) {
+        for (stream, column) in self.streams.iter().zip(&self.columns) {
+            self.add(stream, column, volumes[stream.slot & (N - 1)], levels);
+        }
     }
 
     /// How many pieces a step of `step_s` must be cut into, so that no head changes by more than `curvature` of
     /// √(δ² + head²) and no rate times the step is above `rate`; 1 when it needs no cut.
-    #[inline]
-    pub fn pieces(&self, levels: &[f64], slope: &[f64], step_s: f64, rate: f64, curvature: f64) -> f64 {
+    #[inline(always)]
+    pub fn pieces(&self, levels: &[V; N], slope: &[V; N], step_s: f64, rate: f64, curvature: f64) -> f64 {
         let mut worst = 1.0_f64;
-        for (i, stream) in self.streams.iter().enumerate() {
-            let head = levels[stream.from] - levels[stream.against];
-            let change = (slope[stream.from] - slope[stream.against]).abs() * step_s;
-            if head == 0.0 && change == 0.0 {
+        let (bend2, rate4) = (V::of(curvature * curvature), V::of(rate.powi(4)));
+        for stream in &self.streams {
+            let (from, against) = (stream.from & (N - 1), stream.against & (N - 1));
+            let head = levels[from] - levels[against];
+            let change = (slope[from] - slope[against]) * step_s;
+            let r2 = head * head + V::of(self.delta2);
+            let change2 = change * change;
+            let steepest = stream.k * stream.conductance * step_s;
+            if (change2 - bend2 * r2).largest() > 0.0 {
+                worst = worst.max((change2 / r2).largest().sqrt() / curvature);
+            }
+            if stream.linear {
+                worst = worst.max(steepest.largest() / rate);
                 continue;
             }
-            let r2 = head * head + self.delta2;
-            if change * change > curvature * curvature * r2 {
-                worst = worst.max(change / (curvature * r2.sqrt()));
-            }
-            // dq/dh is at most q/h = k/√r.
-            let steepest = stream.k * stream.conductance * step_s;
-            if i < self.roots {
-                if (steepest * steepest) * (steepest * steepest) > rate.powi(4) * r2 {
-                    worst = worst.max(steepest / (rate * r2.sqrt().sqrt()));
-                }
-            } else {
-                worst = worst.max(steepest / rate);
+            // dq/dh is at most q/h = k/√r. An empty tank with δ = 0 that stays empty needs no steps for its slope.
+            let steepest2 = steepest * steepest;
+            let steep = (steepest2 * steepest2 - rate4 * r2).largest() > 0.0;
+            if steep && (self.delta2 > TINY_CM2 || change2.largest() > 0.0) {
+                worst = worst.max((steepest2 / r2.sqrt()).largest().sqrt() / rate);
             }
         }
         worst

@@ -164,7 +164,8 @@ impl ClosedLoop {
 
     fn fill_row(&mut self) {
         let plant = self.source.plant();
-        let of = |values: Option<&[f64]>, i: usize| values.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
+        let of =
+            |values: Option<&[f64]>, i: usize| values.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
         let (levels, inputs) = (plant.map(|p| p.levels_cm()), plant.map(|p| p.inputs()));
         let (through, angles) = (plant.map(|p| p.valve_flows_cm3_s()), plant.map(|p| p.angles_deg()));
         let (arriving, spills) =

@@ -1,0 +1,162 @@
+//! Numbers of one plant, or of several plants side by side.
+//!
+//! The integrator is written once for both: with `f64` it moves one plant, with [`Pack`] several at a time, whose
+//! arithmetic the compiler turns into vector instructions.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What the integrator needs of a number.
+pub(crate) trait Number:
+    Copy
+    + std::fmt::Debug
+    + PartialEq
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Mul<f64, Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// The same in every plant.
+    fn of(x: f64) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// The larger of both, plant by plant.
+    fn at_least(self, least: f64) -> Self;
+    /// Smallest over the plants; NaN counts as −∞.
+    fn smallest(self) -> f64;
+    /// Largest over the plants.
+    fn largest(self) -> f64;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn at_least(self, least: f64) -> Self {
+        self.max(least)
+    }
+
+    #[inline(always)]
+    fn smallest(self) -> f64 {
+        if self.is_nan() { f64::NEG_INFINITY } else { self }
+    }
+
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self
+    }
+}
+
+/// A number of each of `L` plants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(32))]
+pub(crate) struct Pack<const L: usize>(pub [f64; L]);
+
+impl<const L: usize> Pack<L> {
+    #[inline(always)]
+    fn each(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+impl<const L: usize> Add for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.each(other, |a, b| a + b)
+    }
+}
+
+impl<const L: usize> Sub for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.each(other, |a, b| a - b)
+    }
+}
+
+impl<const L: usize> Mul for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.each(other, |a, b| a * b)
+    }
+}
+
+impl<const L: usize> Div for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.each(other, |a, b| a / b)
+    }
+}
+
+impl<const L: usize> Mul<f64> for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        Self(self.0.map(|x| x * factor))
+    }
+}
+
+impl<const L: usize> Neg for Pack<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+}
+
+impl<const L: usize> AddAssign for Pack<L> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<const L: usize> SubAssign for Pack<L> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<const L: usize> Number for Pack<L> {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        Self([x; L])
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+
+    #[inline(always)]
+    fn at_least(self, least: f64) -> Self {
+        Self(self.0.map(|x| x.max(least)))
+    }
+
+    #[inline(always)]
+    fn smallest(self) -> f64 {
+        self.0.iter().fold(f64::INFINITY, |least, &x| least.min(x.smallest()))
+    }
+
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self.0.iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
+    }
+}

@@ -1,0 +1,150 @@
+//! The integrator in the length that a rig needs.
+
+use super::motion::Motion;
+use super::network::Network;
+use super::pipe::Pipe;
+use super::streams::{Origin, widest};
+
+/// [`Motion`] of a plant, its arrays as long as the rig asks for.
+#[derive(Debug, Clone)]
+pub(crate) enum Motions {
+    Small(Box<Motion<8, f64>>),
+    Medium(Box<Motion<16, f64>>),
+    Large(Box<Motion<64, f64>>),
+    Huge(Box<Motion<512, f64>>),
+}
+
+/// Most nodes, streams or pumps that a rig may have.
+pub(super) const MOST_PARTS: usize = 512;
+
+/// Does the same with the motion of whatever length.
+macro_rules! each {
+    ($of:expr, $motion:ident => $what:expr) => {
+        match $of {
+            Motions::Small($motion) => $what,
+            Motions::Medium($motion) => $what,
+            Motions::Large($motion) => $what,
+            Motions::Huge($motion) => $what,
+        }
+    };
+}
+
+/// What a span came to: volumes in cm³.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Span<'a> {
+    pub streams: &'a [f64],
+    pub pumped: &'a [f64],
+    pub arriving: &'a [f64],
+    pub spills: &'a [f64],
+    pub origins: &'a [Origin],
+}
+
+impl Motions {
+    pub fn new(network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
+        let areas: Vec<f64> = network.tanks.iter().map(|t| t.area_cm2).collect();
+        match widest(network) {
+            ..=8 => Self::Small(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            ..=16 => Self::Medium(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            ..=64 => Self::Large(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            _ => Self::Huge(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+        }
+    }
+
+    /// Lets `duration_s` pass; `levels_cm` gets the levels then.
+    #[inline]
+    pub fn advance(&mut self, network: &Network, duration_s: f64, levels_cm: &mut [f64], dry: &mut [bool]) {
+        each!(self, m => {
+            let (left_s, fed) = m.advance(duration_s);
+            if left_s > 0.0 {
+                m.advance_carefully(network, left_s, fed, dry);
+            }
+            m.end_span();
+            levels_cm.copy_from_slice(&m.presents()[..levels_cm.len()]);
+        });
+    }
+
+    pub fn span(&self) -> Span<'_> {
+        each!(self, m => Span {
+            streams: &m.span_volume,
+            pumped: &m.span_pumped,
+            arriving: &m.span_arriving,
+            spills: &m.span_spills,
+            origins: &m.streams.origins,
+        })
+    }
+
+    /// Flows through the open streams now, in cm³/s.
+    pub fn flows(&self) -> (&[f64], &[Origin]) {
+        each!(self, m => (&m.end_flow, &m.streams.origins))
+    }
+
+    /// Sets the flow a pump draws, in cm³/s, from now on.
+    #[inline]
+    pub fn command(&mut self, pump: usize, flow_cm3_s: f64) {
+        each!(self, m => {
+            if m.commanded[pump] != flow_cm3_s {
+                if !m.look_ahead {
+                    m.cut();
+                }
+                m.commanded[pump] = flow_cm3_s;
+            }
+        });
+    }
+
+    pub fn commanded(&self) -> &[f64] {
+        each!(self, m => &m.commanded)
+    }
+
+    pub fn pipes(&self) -> &[Pipe<f64>] {
+        each!(self, m => &m.pipes)
+    }
+
+    /// Changes pipes at the present.
+    pub fn change_pipes<T>(&mut self, change: impl FnOnce(&mut [Pipe<f64>]) -> T) -> T {
+        each!(self, m => {
+            m.cut();
+            let outcome = change(&mut m.pipes);
+            m.restart();
+            outcome
+        })
+    }
+
+    /// Takes new coefficients of valves and leaks at the present.
+    pub fn collect(&mut self, network: &Network, coefficients: &[f64], leaks: &[f64]) {
+        each!(self, m => {
+            m.cut();
+            m.streams.collect(network, coefficients, leaks);
+            m.restart();
+        });
+    }
+
+    /// Goes on from these levels in cm.
+    pub fn set_levels(&mut self, levels_cm: &[f64]) {
+        each!(self, m => {
+            m.cut();
+            m.end[..levels_cm.len()].copy_from_slice(levels_cm);
+            m.restart();
+        });
+    }
+
+    /// Volumes outside and on the floor, in cm³.
+    pub fn lost_cm3(&self) -> (f64, f64) {
+        each!(self, m => (m.present(m.streams.outside()), m.present(m.streams.floor())))
+    }
+
+    pub fn set_lost_cm3(&mut self, outside: f64, floor: f64) {
+        each!(self, m => {
+            m.cut();
+            m.end[m.streams.outside()] = outside;
+            m.end[m.streams.floor()] = floor;
+        });
+    }
+
+    pub fn in_flight_cm3(&self) -> f64 {
+        each!(self, m => m.in_flight())
+    }
+
+    pub fn steps(&self) -> u64 {
+        each!(self, m => m.steps)
+    }
+}
