@@ -66,15 +66,33 @@ pub enum RigError {
         /// Tank at both ends.
         tank: String,
     },
-    /// Two loops write the same pump.
-    #[error("the loops {first} and {second} both write the pump {pump}")]
+    /// Two loops write the same pump, or the setpoint of the same loop.
+    #[error("the loops {first} and {second} both write {pump}")]
     SharedPump {
         /// One loop.
         first: String,
         /// The other.
         second: String,
-        /// Pump both write.
+        /// Pump or loop both write.
         pump: String,
+    },
+    /// A loop that writes nothing, or two things.
+    #[error("the loop {item} must write one thing: give it either a pump or, with cascade_to, a loop")]
+    Target {
+        /// Tag of the loop.
+        item: String,
+    },
+    /// Loops that write each other's setpoints in a circle.
+    #[error("the cascade from {item} leads to no pump: its loops write each other's setpoints")]
+    CascadeCircle {
+        /// Tag of a loop.
+        item: String,
+    },
+    /// Cascade mode without a loop that gives the setpoint.
+    #[error("{item} cannot be in cascade: no loop writes its setpoint")]
+    NoOuterLoop {
+        /// Tag of the loop.
+        item: String,
     },
     /// Water that does not fit.
     #[error("the reservoir {tank} would start at {} cm: the tanks hold more than water_cm3 or less than the rim allows", number(*.level_cm))]
@@ -110,6 +128,9 @@ impl Explain for RigError {
             Self::Curve { .. } => "rig.curve",
             Self::Loop { .. } => "rig.loop",
             Self::SharedPump { .. } => "rig.shared_pump",
+            Self::Target { .. } => "rig.target",
+            Self::CascadeCircle { .. } => "rig.cascade_circle",
+            Self::NoOuterLoop { .. } => "rig.no_outer_loop",
             Self::Water { .. } => "rig.water",
             Self::Unreachable { .. } => "rig.unreachable",
         }
@@ -131,6 +152,9 @@ impl Explain for RigError {
             ],
             Self::Curve { item } => vec![("item", item.clone())],
             Self::Loop { item, tank } => vec![("item", item.clone()), ("tank", tank.clone())],
+            Self::Target { item } | Self::CascadeCircle { item } | Self::NoOuterLoop { item } => {
+                vec![("item", item.clone())]
+            }
             Self::SharedPump { first, second, pump } => {
                 vec![("first", first.clone()), ("second", second.clone()), ("pump", pump.clone())]
             }
@@ -160,6 +184,9 @@ impl RigError {
             Self::Curve { item: text("BA01") },
             Self::Loop { item: text("FV01"), tank: text("TQ1") },
             Self::SharedPump { first: text("LIC-01"), second: text("LIC-02"), pump: text("BA01") },
+            Self::Target { item: text("LIC-01") },
+            Self::CascadeCircle { item: text("LIC-01") },
+            Self::NoOuterLoop { item: text("LIC-01") },
             Self::Water { tank: text("TQ4"), level_cm: -3.5 },
             Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },
         ]

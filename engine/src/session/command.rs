@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::{GainsError, Mode, PidTuning};
+use crate::control::{GainsError, Law, LoopOptions, Mode, PidTuning};
 use crate::explain::{Explain, number};
 use crate::plant::{Measurement, RigError};
 
@@ -17,7 +17,7 @@ pub enum RigCommand {
         /// Setpoint in cm.
         level_cm: f64,
     },
-    /// Manual or automatic.
+    /// Manual, automatic or cascade.
     Mode {
         /// Loop.
         tag: String,
@@ -37,6 +37,20 @@ pub enum RigCommand {
         tag: String,
         /// Gains and weights.
         tuning: PidTuning,
+    },
+    /// Another law of a loop, or other settings of its law; the output goes on from where it is.
+    Law {
+        /// Loop.
+        tag: String,
+        /// The law with its settings.
+        law: Law,
+    },
+    /// What stands around the law of a loop: limits, setpoint path, deadband, schedule, feed-forward, predictor.
+    Options {
+        /// Loop.
+        tag: String,
+        /// All of it; what is left out is off.
+        options: Box<LoopOptions>,
     },
     /// New PV filter of a loop.
     PvFilter {
@@ -114,6 +128,20 @@ pub enum CommandError {
         /// Loop.
         tag: String,
     },
+    /// A setpoint sent to a loop that takes it from another.
+    #[error("{tag} is in cascade and takes its setpoint from another loop; switch it to automatic first")]
+    Cascade {
+        /// Loop.
+        tag: String,
+    },
+    /// An output sent to an outer loop that follows its inner loop's setpoint.
+    #[error("{tag} follows the setpoint of {inner}; switch {inner} to cascade first")]
+    Follows {
+        /// Outer loop.
+        tag: String,
+        /// Inner loop.
+        inner: String,
+    },
     /// A valve, tank or configuration of something that has none.
     #[error("this source has no valves or tanks that can be set from here")]
     NotARig,
@@ -133,6 +161,8 @@ impl Explain for CommandError {
             Self::UnknownTag { .. } => "command.unknown_tag",
             Self::Setpoint { .. } => "command.setpoint",
             Self::Automatic { .. } => "command.automatic",
+            Self::Cascade { .. } => "command.cascade",
+            Self::Follows { .. } => "command.follows",
             Self::NotARig => "command.not_a_rig",
             Self::Speed { .. } => "command.speed",
         }
@@ -142,7 +172,10 @@ impl Explain for CommandError {
         match self {
             Self::Rig(error) => error.args(),
             Self::Gains(error) => error.args(),
-            Self::UnknownTag { tag } | Self::Automatic { tag } => vec![("tag", tag.clone())],
+            Self::UnknownTag { tag } | Self::Automatic { tag } | Self::Cascade { tag } => {
+                vec![("tag", tag.clone())]
+            }
+            Self::Follows { tag, inner } => vec![("tag", tag.clone()), ("inner", inner.clone())],
             Self::Setpoint { tag, level_cm, rim_cm } => {
                 vec![("tag", tag.clone()), ("level_cm", number(*level_cm)), ("rim_cm", number(*rim_cm))]
             }
@@ -161,6 +194,8 @@ impl CommandError {
             Self::UnknownTag { tag: tag() },
             Self::Setpoint { tag: tag(), level_cm: 31.0, rim_cm: 27.0 },
             Self::Automatic { tag: tag() },
+            Self::Cascade { tag: tag() },
+            Self::Follows { tag: tag(), inner: "LIC-03".to_owned() },
             Self::NotARig,
             Self::Speed { speed: -3.0 },
         ]
