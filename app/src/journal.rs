@@ -92,6 +92,7 @@ fn done(command: &RigCommand) -> String {
             let mode = match mode {
                 vasos_engine::control::Mode::Manual => tr!("mode.manual"),
                 vasos_engine::control::Mode::Automatic => tr!("mode.auto"),
+                vasos_engine::control::Mode::Cascade => tr!("mode.cascade"),
             };
             tr!("event.mode", tag = tag, mode = mode)
         }
@@ -106,6 +107,10 @@ fn done(command: &RigCommand) -> String {
                 td = text::brief(g.td_s)
             )
         }
+        RigCommand::Law { tag, law } => {
+            tr!("event.law", tag = tag, law = tr!(&format!("law.{}", law.id())))
+        }
+        RigCommand::Options { tag, .. } => tr!("event.options", tag = tag),
         RigCommand::PvFilter { tag, time_constant_s } => {
             tr!("event.pv_filter", tag = tag, filter = text::brief(*time_constant_s))
         }

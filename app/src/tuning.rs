@@ -131,8 +131,11 @@ impl TuningTable {
 #[must_use]
 pub fn same_units(document: &Document, entry: &ModelEntry, focus: usize) -> bool {
     let spec = &document.rig.network.spec;
-    let pump =
-        document.rig.active_loops().get(focus).and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump));
+    let pump = document
+        .rig
+        .active_loops()
+        .get(focus)
+        .and_then(|l| spec.pumps.iter().find(|p| Some(&p.id) == l.pump.as_ref()));
     pump.is_some_and(|p| entry.pv_unit == "cm" && entry.mv_unit == p.unit.symbol())
 }
 

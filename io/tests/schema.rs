@@ -26,7 +26,7 @@ fn runs(scenario: &Path) -> usize {
 #[test]
 fn the_rig_example_is_a_rig() {
     let network = parse_rig("SCHEMA.md", &example("rig")).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!((network.tanks.len(), network.spec.configurations.len()), (2, 1));
+    assert_eq!((network.tanks.len(), network.spec.configurations.len()), (2, 2));
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("rig.toml"), example("rig")).expect("written");
     let scenario = folder.path().join("run.toml");
@@ -47,7 +47,7 @@ fn the_scenario_example_runs_and_shows_every_command() {
         .map(|e| std::mem::discriminant(&e.command))
         .map(|d| format!("{d:?}"))
         .collect();
-    assert_eq!(shown.len(), 11, "one event of each command");
+    assert_eq!(shown.len(), 13, "one event of each command");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use vasos_app::cli::parse::ParseError;
 use vasos_engine::analyze::MetricsError;
-use vasos_engine::control::GainsError;
+use vasos_engine::control::{FormError, GainsError};
 use vasos_engine::document::DocumentError;
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{FitError, FitVerdict};
@@ -205,6 +205,7 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
     vec![
         ("RigError", boxed(RigError::samples())),
         ("GainsError", boxed(GainsError::samples())),
+        ("FormError", boxed(FormError::samples())),
         ("ModelError", boxed(ModelError::samples())),
         ("CommandError", boxed(CommandError::samples())),
         ("DocumentError", boxed(DocumentError::samples())),

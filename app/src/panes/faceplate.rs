@@ -4,6 +4,7 @@ use eframe::egui::{self, Align2, Color32, FontId, Rect, Role, Sense, Stroke, Wid
 use vasos_engine::control::Mode;
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{LoopNow, RigCommand};
+use vasos_engine::sim::LoopTarget;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -52,7 +53,7 @@ fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, act
             ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
         }
         let modes = [tr!("mode.man"), tr!("mode.auto")];
-        let chosen = usize::from(now.mode == Mode::Automatic);
+        let chosen = usize::from(now.mode.is_controlling());
         if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {
             let mode = if chosen == 1 { Mode::Automatic } else { Mode::Manual };
             actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), mode)));
@@ -64,13 +65,12 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let p = theme::palette(ui);
     let network = &view.snapshot.network;
     let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
-    let pump = &network.pumps[now.pump];
-    let unit = network.spec.pumps[now.pump].unit.symbol();
+    let unit = mv_unit(view, now);
     let height = (ui.available_height() - 254.0).clamp(44.0, 260.0);
     let columns = [
         ("PV", now.pv_cm, 0.0, rim, "cm", 2, p.pv),
         ("SP", now.setpoint_cm, 0.0, rim, "cm", 2, p.sp),
-        ("MV", now.mv, pump.min, pump.max, unit, 2, p.mv),
+        ("MV", now.mv, now.range.low, now.range.high, unit, 2, p.mv),
     ];
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 54.0), Sense::hover());
     response.widget_info(|| {
@@ -96,6 +96,14 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     }
 }
 
+/// Unit of a loop's output: of its pump, or of its inner loop's setpoint.
+fn mv_unit(view: &View, now: &LoopNow) -> &'static str {
+    match now.target {
+        LoopTarget::Pump(pump) => view.snapshot.network.spec.pumps[pump].unit.symbol(),
+        LoopTarget::Loop(_) => "cm",
+    }
+}
+
 fn bar(ui: &egui::Ui, well: Rect, share: f32, colour: Color32, p: &theme::Palette) {
     ui.painter().rect(well, 2.0, p.well, Stroke::new(1.0, p.edge), egui::StrokeKind::Inside);
     let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
@@ -114,10 +122,9 @@ fn bar(ui: &egui::Ui, well: Rect, share: f32, colour: Color32, p: &theme::Palett
 fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
     let network = &view.snapshot.network;
     let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
-    let pump = &network.pumps[now.pump];
     let manual = now.mode == Mode::Manual;
     let (label, value, low, high, unit) = if manual {
-        (tr!("faceplate.output"), now.mv, pump.min, pump.max, network.spec.pumps[now.pump].unit.symbol())
+        (tr!("faceplate.output"), now.mv, now.limits.low, now.limits.high, mv_unit(view, now))
     } else {
         (tr!("faceplate.setpoint"), now.setpoint_cm, 0.0, rim, "cm")
     };
@@ -166,7 +173,7 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
 
 fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
     let Some(settings) = view.document.rig.loops.get(&now.tag) else { return };
-    let unit = view.snapshot.network.spec.pumps[now.pump].unit.symbol();
+    let unit = mv_unit(view, now);
     let action = if now.tuning.gains.kc > 0.0 { tr!("faceplate.reverse") } else { tr!("faceplate.direct") };
     ui.label(egui::RichText::new(format!("PID-I2GL · {action}")).small());
     let gains = settings.tuning.gains;

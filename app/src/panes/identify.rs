@@ -107,8 +107,9 @@ fn of_run(document: &Document, run: &RunTrace, stretch: Stretch, focus: usize) -
     let range = pv.index_at(from_s)..pv.index_at(stretch.to_s);
     let active = document.rig.active_loops().get(focus);
     let spec = &document.rig.network.spec;
-    let unit =
-        active.and_then(|l| spec.pumps.iter().find(|p| p.id == l.pump)).map_or("", |p| p.unit.symbol());
+    let unit = active
+        .and_then(|l| spec.pumps.iter().find(|p| Some(&p.id) == l.pump.as_ref()))
+        .map_or("", |p| p.unit.symbol());
     let whole: Vec<usize> =
         range.filter(|&i| pv.values()[i].is_finite() && mv.values()[i].is_finite()).collect();
     let take = |values: &[f64]| whole.iter().map(|&i| values[i]).collect::<Vec<f64>>();

@@ -35,6 +35,11 @@ pub enum GainsError {
         /// Offending value in seconds.
         value: f64,
     },
+    /// Ti infinite for PID-I2GL.
+    #[error(
+        "PID-I2GL needs integral action, Ti = ∞ is not usable: P and D alone have no anchor in it; choose the positional PID"
+    )]
+    Anchor,
     /// Td negative or not finite.
     #[error("Td = {} s is not usable: it must be 0 or more", number(*.value))]
     Td {
@@ -70,6 +75,7 @@ impl GainsError {
         vec![
             Self::Kc { value: 0.0 },
             Self::Ti { value: -1.0 },
+            Self::Anchor,
             Self::Td { value: -1.0 },
             Self::N { value: 0.0 },
             Self::Weight { name: "b", value: 3.0 },
@@ -83,6 +89,7 @@ impl Explain for GainsError {
         match self {
             Self::Kc { .. } => "gains.kc",
             Self::Ti { .. } => "gains.ti",
+            Self::Anchor => "gains.anchor",
             Self::Td { .. } => "gains.td",
             Self::N { .. } => "gains.n",
             Self::Weight { .. } => "gains.weight",
@@ -92,6 +99,7 @@ impl Explain for GainsError {
 
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
+            Self::Anchor => vec![],
             Self::Kc { value }
             | Self::Ti { value }
             | Self::Td { value }

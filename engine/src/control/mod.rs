@@ -1,12 +1,44 @@
-//! Controllers: gains in the field's forms, PID-I2GL and the loop around it.
+//! Controllers: the laws, the forms their gains are written in, and the loop around them.
 //!
-//! e = r − y; every quantity in engineering units. `update` allocates nothing. Input that is not finite
-//! holds the last output and is reported.
+//! e = r − y; every quantity in engineering units. Every law is a [`Controller`]: a small state machine whose
+//! `step` allocates nothing. Input that is not finite holds the last output and is reported. What stands
+//! around a law (filters, limits, feed-forward, predictor, schedule) is in [`ControlLoop`], whose header gives
+//! the order.
 
 mod control_loop;
+mod controller;
+mod deadband;
+mod derivative;
+mod feedforward;
+mod forms;
 mod gains;
+mod law;
+mod loop_spec;
+mod on_off;
+mod options;
+mod pid_2gl;
 mod pid_i2gl;
+mod schedule;
+mod setpoint_path;
+mod smith;
+mod tuning;
+mod wiring;
 
-pub use control_loop::{ControlLoop, LoopSpec, check_filter};
+pub use control_loop::{ControlLoop, LoopInput, OutputRange};
+pub use controller::{Bound, ControlInput, ControlOutput, Controller, Limits, Mode, Parts};
+pub use deadband::Deadband;
+pub use derivative::derivative_coefficients;
+pub use feedforward::{Feedforward, LeadLag};
+pub use forms::{Form, FormError, FormGains, ParallelGains, SeriesGains};
 pub use gains::{GainsError, PidGains};
-pub use pid_i2gl::{ControlOutput, Mode, PidI2gl, PidTuning};
+pub use law::{Action, AntiWindup, Clip, Law, Sends};
+pub use loop_spec::{LoopSpec, check_filter};
+pub use on_off::OnOff;
+pub use options::{LoopOptions, OutputLimits};
+pub use pid_2gl::Pid2gl;
+pub use pid_i2gl::PidI2gl;
+pub use schedule::{SchedulePoint, scheduled};
+pub use setpoint_path::{SetpointPath, SetpointShaper};
+pub use smith::{SmithModel, SmithPredictor};
+pub use tuning::PidTuning;
+pub use wiring::{check_loop, check_loops, execution_order, final_pump, outer_of, output_range};

@@ -10,91 +10,70 @@
 //!
 //! P is never stored, so a change of K or b at any error brings no jump. Input that is not finite holds
 //! the last output and is reported.
+//!
+//! With [`Clip::Integral`] the sum of the increments is kept beyond the limit and only ΔI is cut:
+//!
+//! ```text
+//! w = v_{k−1} + ΔP + ΔD,   v_k = max(w, high) where ΔI > 0 leads over the limit (min(w, low) likewise), else w + ΔI
+//! u_k = sat(v_k)
+//! ```
 
-use serde::{Deserialize, Serialize};
-
-use super::gains::{GainsError, PidGains};
-
-/// Tuning of a PID with two degrees of freedom.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PidTuning {
-    /// Gains of the ideal form.
-    pub gains: PidGains,
-    /// b, weight of the setpoint in the proportional part.
-    pub b: f64,
-    /// c, weight of the setpoint in the derivative part.
-    pub c: f64,
-}
-
-impl PidTuning {
-    /// Weights b = 1, c = 0: proportional on the error, derivative on the PV.
-    #[must_use]
-    pub fn new(gains: PidGains) -> Self {
-        Self { gains, b: 1.0, c: 0.0 }
-    }
-
-    /// Checks the gains for this law, which needs integral action: P and D alone have no anchor in it.
-    ///
-    /// # Errors
-    /// [`GainsError`] with the offending value.
-    pub fn validated(self) -> Result<Self, GainsError> {
-        let gains = self.gains.validated()?;
-        if !gains.ti_s.is_finite() {
-            return Err(GainsError::Ti { value: gains.ti_s });
-        }
-        for (name, value) in [("b", self.b), ("c", self.c)] {
-            if !value.is_finite() || !(0.0..=2.0).contains(&value) {
-                return Err(GainsError::Weight { name, value });
-            }
-        }
-        Ok(self)
-    }
-}
-
-/// Who writes the output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// The operator.
-    Manual,
-    /// The controller.
-    Automatic,
-}
-
-/// What one sample of the controller came to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ControlOutput {
-    /// Output within its limits, in MV units.
-    pub mv: f64,
-    /// The increment the law asked for before the limiter, in MV units.
-    pub wanted_increment: f64,
-    /// The input was not finite and the output is held.
-    pub held: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Last {
-    setpoint: f64,
-    pv: f64,
-}
+use super::controller::{ControlInput, ControlOutput, Controller, Limits, Mode, Parts};
+use super::derivative::{Signals, derivative_coefficients, integral_step};
+use super::law::Clip;
+use super::tuning::PidTuning;
 
 /// The controller's state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PidI2gl {
     tuning: PidTuning,
+    clip: Clip,
     sample_time_s: f64,
-    low: f64,
-    high: f64,
+    limits: Limits,
     mv: f64,
+    /// Sum of the increments where only the integral is clipped.
+    sum: f64,
     derivative: f64,
-    last: Option<Last>,
+    last: Option<Signals>,
+    last_feedforward: Option<f64>,
 }
 
 impl PidI2gl {
     /// A controller at rest at the output `mv`, limited to `low…high`, sampled every `sample_time_s`.
     #[must_use]
     pub fn new(tuning: PidTuning, sample_time_s: f64, low: f64, high: f64, mv: f64) -> Self {
-        Self { tuning, sample_time_s, low, high, mv: mv.clamp(low, high), derivative: 0.0, last: None }
+        let limits = Limits { low, high };
+        Self { limits, ..Self::at(tuning, sample_time_s, limits.clamp(mv)) }
+    }
+
+    /// A controller at rest at the output `mv` whose limits come with each sample.
+    pub(super) fn at(tuning: PidTuning, sample_time_s: f64, mv: f64) -> Self {
+        let limits = Limits { low: f64::NEG_INFINITY, high: f64::INFINITY };
+        Self {
+            tuning,
+            clip: Clip::Output,
+            sample_time_s,
+            limits,
+            mv,
+            sum: mv,
+            derivative: 0.0,
+            last: None,
+            last_feedforward: None,
+        }
+    }
+
+    /// With the choice of what a limit clips.
+    #[must_use]
+    pub fn clipping(mut self, clip: Clip) -> Self {
+        self.set_clip(clip);
+        self
+    }
+
+    /// Changes what a limit clips; the output goes on from where it is.
+    pub fn set_clip(&mut self, clip: Clip) {
+        if clip != self.clip {
+            (self.clip, self.sum) = (clip, self.mv);
+        }
     }
 
     /// The tuning in use.
@@ -121,45 +100,103 @@ impl PidI2gl {
     /// Puts the output to a value, for manual operation.
     pub fn set_mv(&mut self, mv: f64) {
         if mv.is_finite() {
-            self.mv = mv.clamp(self.low, self.high);
+            self.mv = self.limits.clamp(mv);
+            self.sum = self.mv;
         }
     }
 
     /// a_d and b_d of the derivative filter for the present tuning.
     #[must_use]
     pub fn derivative_coefficients(&self) -> (f64, f64) {
-        let PidGains { kc, td_s, n, .. } = self.tuning.gains;
-        let nh = n * self.sample_time_s;
-        if td_s == 0.0 {
-            (0.0, 0.0)
-        } else if 2.0 * td_s < nh {
-            (td_s / (td_s + nh), kc * n * td_s / (td_s + nh))
-        } else {
-            ((2.0 * td_s - nh) / (2.0 * td_s + nh), 2.0 * kc * n * td_s / (2.0 * td_s + nh))
-        }
+        derivative_coefficients(&self.tuning.gains, self.sample_time_s)
     }
 
     /// One sample: setpoint and PV in PV units. In manual only r, y and D are kept up to date.
     pub fn update(&mut self, setpoint: f64, pv: f64, mode: Mode) -> ControlOutput {
-        if !setpoint.is_finite() || !pv.is_finite() {
-            return ControlOutput { mv: self.mv, wanted_increment: 0.0, held: true };
+        let (limits, controlling) = (self.limits, mode.is_controlling());
+        self.step(&ControlInput { setpoint, pv, feedforward: 0.0, limits, controlling })
+    }
+
+    /// Adds the increments to the output; gives what they led to before the limiter.
+    fn add(&mut self, increments: &Parts, limits: Limits) -> f64 {
+        let others = increments.p + increments.d + increments.feedforward;
+        let sum = match self.clip {
+            Clip::Output => self.mv + (others + increments.i),
+            Clip::Integral => {
+                let without = self.sum + others;
+                let whole = without + increments.i;
+                self.sum = if increments.i > 0.0 && whole > limits.high {
+                    without.max(limits.high)
+                } else if increments.i < 0.0 && whole < limits.low {
+                    without.min(limits.low)
+                } else {
+                    whole
+                };
+                whole
+            }
+        };
+        self.mv = limits.clamp(if self.clip == Clip::Output { sum } else { self.sum });
+        sum
+    }
+}
+
+impl Controller for PidI2gl {
+    fn step(&mut self, input: &ControlInput) -> ControlOutput {
+        let now = Signals { setpoint: input.setpoint, pv: input.pv };
+        if !now.setpoint.is_finite() || !now.pv.is_finite() || !input.feedforward.is_finite() {
+            return ControlOutput::held(self.mv);
         }
-        let last = self.last.unwrap_or(Last { setpoint, pv });
-        self.last = Some(Last { setpoint, pv });
+        let last = self.last.unwrap_or(now);
         let PidTuning { gains, b, c } = self.tuning;
         let (a_d, b_d) = self.derivative_coefficients();
-        let weighted = |w: f64, s: &Last| w * s.setpoint - s.pv;
-        let now = Last { setpoint, pv };
-        let derivative = a_d * self.derivative + b_d * (weighted(c, &now) - weighted(c, &last));
-        let delta_d = derivative - self.derivative;
-        self.derivative = derivative;
-        let delta_p = gains.kc * (weighted(b, &now) - weighted(b, &last));
-        let delta_i = gains.kc * self.sample_time_s / (2.0 * gains.ti_s)
-            * ((setpoint - pv) + (last.setpoint - last.pv));
-        let wanted_increment = delta_p + delta_d + delta_i;
-        if mode == Mode::Automatic {
-            self.mv = (self.mv + wanted_increment).clamp(self.low, self.high);
+        let derivative = a_d * self.derivative + b_d * (now.weighted(c) - last.weighted(c));
+        let parts = Parts {
+            p: gains.kc * (now.weighted(b) - last.weighted(b)),
+            i: integral_step(&gains, self.sample_time_s, now, last),
+            d: derivative - self.derivative,
+            feedforward: input.feedforward - self.last_feedforward.unwrap_or(input.feedforward),
+            bias: 0.0,
+        };
+        let wanted_increment = parts.p + parts.d + parts.i + parts.feedforward;
+        if !wanted_increment.is_finite() {
+            return ControlOutput::held(self.mv);
         }
-        ControlOutput { mv: self.mv, wanted_increment, held: false }
+        self.last = Some(now);
+        self.last_feedforward = Some(input.feedforward);
+        self.derivative = derivative;
+        let mut cut = None;
+        if input.controlling {
+            cut = input.limits.cuts(self.add(&parts, input.limits));
+        } else {
+            self.mv = input.limits.clamp(self.mv);
+            self.sum = self.mv;
+        }
+        ControlOutput { mv: self.mv, wanted_increment, held: false, cut, parts }
+    }
+
+    fn mv(&self) -> f64 {
+        self.mv
+    }
+
+    fn set_mv(&mut self, mv: f64) {
+        Self::set_mv(self, mv);
+    }
+
+    fn applied(&mut self, mv: f64) {
+        if mv.is_finite() {
+            self.mv = mv;
+            if self.clip == Clip::Output {
+                self.sum = mv;
+            }
+        }
+    }
+
+    fn rebase(&mut self) {
+        (self.last, self.last_feedforward, self.derivative) = (None, None, 0.0);
+        self.sum = self.mv;
+    }
+
+    fn set_tuning(&mut self, tuning: PidTuning) {
+        Self::set_tuning(self, tuning);
     }
 }

@@ -6,7 +6,7 @@ use super::data::{
     Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings,
     SourceChoice, Stretch,
 };
-use crate::control::{GainsError, Mode, PidTuning, check_filter};
+use crate::control::{GainsError, Law, LoopOptions, LoopSpec, Mode, PidTuning, check_filter, check_loop};
 use crate::explain::{Explain, number};
 use crate::identify::FopdtFit;
 use crate::model::ProcessModel;
@@ -31,6 +31,10 @@ pub enum DocumentCommand {
     PvFilter(String, f64),
     /// Tuning and PV filter of a loop together, as one step of the history.
     ApplyTuning(String, PidTuning, f64),
+    /// Law of a loop with its settings.
+    Law(String, Law),
+    /// What stands around the law of a loop, all of it.
+    Options(String, Box<LoopOptions>),
     /// Angle of a valve in degrees.
     Angle(String, f64),
     /// Imperfections of the simulated rig.
@@ -138,6 +142,8 @@ impl DocumentCommand {
             Self::Mode(..) => "mode",
             Self::Tuning(..) | Self::ApplyTuning(..) => "tuning",
             Self::PvFilter(..) => "pv_filter",
+            Self::Law(..) => "law",
+            Self::Options(..) => "options",
             Self::Angle(..) => "angle",
             Self::Measurement(_) => "measurement",
             Self::Seed(_) => "seed",
@@ -161,6 +167,8 @@ impl DocumentCommand {
             | Self::Angle(tag, _)
             | Self::TauC(tag, _)
             | Self::Tuning(tag, _)
+            | Self::Law(tag, _)
+            | Self::Options(tag, _)
             | Self::PvFilter(tag, _) => Some(format!("{} {tag}", self.key())),
             Self::Stretch(_) | Self::Candidate(_) => Some(self.key().to_owned()),
             _ => None,
@@ -185,20 +193,29 @@ impl Document {
             }
             DocumentCommand::Setpoint(tag, level_cm) => {
                 next.check_setpoint(tag, *level_cm)?;
-                next.settings(tag)?.setpoint_cm = *level_cm;
+                let settings = next.settings(tag)?;
+                if settings.mode == Mode::Cascade {
+                    return Err(CommandError::Cascade { tag: tag.clone() }.into());
+                }
+                settings.setpoint_cm = *level_cm;
             }
-            DocumentCommand::Mode(tag, mode) => next.settings(tag)?.mode = *mode,
+            DocumentCommand::Mode(tag, mode) => next.set_loop(tag, |l| l.mode = *mode)?,
             DocumentCommand::Tuning(tag, tuning) => {
-                next.settings(tag)?.tuning = tuning.validated().map_err(CommandError::from)?;
+                tuning.validated(&next.settings(tag)?.law).map_err(CommandError::from)?;
+                next.set_loop(tag, |l| l.tuning = *tuning)?;
+            }
+            DocumentCommand::Law(tag, law) => next.set_loop(tag, |l| l.law = *law)?,
+            DocumentCommand::Options(tag, options) => {
+                next.set_loop(tag, |l| l.options.clone_from(options))?;
             }
             DocumentCommand::PvFilter(tag, filter_s) => {
                 next.settings(tag)?.pv_filter_s = check_filter(*filter_s).map_err(CommandError::from)?;
             }
             DocumentCommand::ApplyTuning(tag, tuning, filter_s) => {
                 let usable = |e: GainsError| CommandError::from(e);
-                let settings = next.settings(tag)?;
-                settings.tuning = tuning.validated().map_err(usable)?;
-                settings.pv_filter_s = check_filter(*filter_s).map_err(usable)?;
+                tuning.validated(&next.settings(tag)?.law).map_err(usable)?;
+                let filter_s = check_filter(*filter_s).map_err(usable)?;
+                next.set_loop(tag, |l| (l.tuning, l.pv_filter_s) = (*tuning, filter_s))?;
             }
             DocumentCommand::Angle(tag, angle_deg) => next.turn(tag, *angle_deg)?,
             DocumentCommand::Measurement(measurement) => next.rig.measurement = *measurement,
@@ -256,6 +273,28 @@ impl Document {
     fn settings(&mut self, tag: &str) -> Result<&mut LoopSettings, DocumentError> {
         let unknown = || CommandError::UnknownTag { tag: tag.to_owned() };
         self.rig.loops.get_mut(tag).ok_or_else(|| unknown().into())
+    }
+
+    /// Changes the settings of a loop when its rig allows it.
+    fn set_loop(&mut self, tag: &str, change: impl FnOnce(&mut LoopSettings)) -> Result<(), DocumentError> {
+        change(self.settings(tag)?);
+        let network = self.rig.network.clone();
+        let active = network.spec.configurations.get(self.rig.configuration);
+        let has = |loops: &[LoopSpec]| loops.iter().any(|l| l.id == tag);
+        // The same tag may be wired differently in other configurations: the present one counts.
+        let only_active = active.is_some_and(|c| has(&c.loops));
+        for (place, configuration) in network.spec.configurations.iter().enumerate() {
+            let Some(index) = configuration.loops.iter().position(|l| l.id == tag) else { continue };
+            if only_active && place != self.rig.configuration {
+                continue;
+            }
+            let mut specs: Vec<LoopSpec> = configuration.loops.clone();
+            if let Some(settings) = self.rig.loops.get(tag) {
+                settings.put_into(&mut specs[index]);
+            }
+            check_loop(&network, &specs, &specs[index]).map_err(CommandError::from)?;
+        }
+        Ok(())
     }
 
     fn check_setpoint(&self, tag: &str, level_cm: f64) -> Result<(), DocumentError> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::control::{LoopSpec, Mode, PidGains, PidTuning};
+use crate::control::{Law, LoopOptions, LoopSpec, Mode, PidGains, PidTuning, outer_of};
 use crate::identify::FopdtFit;
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
@@ -21,6 +21,10 @@ pub struct LoopSettings {
     pub tuning: PidTuning,
     /// Time constant of the PV filter in seconds.
     pub pv_filter_s: f64,
+    /// The law with its settings.
+    pub law: Law,
+    /// What stands around the law.
+    pub options: LoopOptions,
 }
 
 impl LoopSettings {
@@ -32,7 +36,16 @@ impl LoopSettings {
             mode: spec.mode,
             tuning: spec.tuning(),
             pv_filter_s: spec.pv_filter_s,
+            law: spec.law,
+            options: spec.options.clone(),
         }
+    }
+
+    /// Writes these settings into the description of their loop.
+    pub(super) fn put_into(&self, spec: &mut LoopSpec) {
+        spec.set_tuning(self.tuning);
+        (spec.setpoint_cm, spec.mode, spec.pv_filter_s) = (self.setpoint_cm, self.mode, self.pv_filter_s);
+        (spec.law, spec.options) = (self.law, self.options.clone());
     }
 }
 
@@ -101,9 +114,12 @@ impl RigSettings {
             tags(self).iter().map(|tag| self.loops.get(tag).map(|l| l.mode)).collect();
         self.configuration = configuration;
         self.turn_valves();
+        let network = self.network.clone();
+        let loops = network.spec.configurations.get(configuration).map_or(&[][..], |c| &c.loops);
         for (tag, mode) in tags(self).iter().zip(modes) {
             if let (Some(mode), Some(settings)) = (mode, self.loops.get_mut(tag)) {
-                settings.mode = mode;
+                let alone = outer_of(loops, tag).is_none();
+                settings.mode = if mode == Mode::Cascade && alone { Mode::Automatic } else { mode };
             }
         }
     }

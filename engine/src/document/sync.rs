@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::data::{Document, RigSettings};
+use super::data::{Document, LoopSettings, RigSettings};
+use crate::control::{Law, Mode};
 use crate::session::RigCommand;
 
 /// What the session has to do so that the rig agrees with the document.
@@ -56,22 +57,9 @@ fn difference(before: &RigSettings, after: &RigSettings) -> Vec<RigCommand> {
     }
     for active in after.active_loops() {
         let Some(new) = after.loops.get(&active.id) else { continue };
-        let old = before.loops.get(&active.id);
-        let tag = || active.id.clone();
         // A loop that takes over gets all its settings: the session keeps its own copy of them.
-        let differs = |same: bool| turned || !same;
-        if differs(old.is_some_and(|o| o.setpoint_cm == new.setpoint_cm)) {
-            commands.push(RigCommand::Setpoint { tag: tag(), level_cm: new.setpoint_cm });
-        }
-        if differs(old.is_some_and(|o| o.tuning == new.tuning)) {
-            commands.push(RigCommand::Tuning { tag: tag(), tuning: new.tuning });
-        }
-        if differs(old.is_some_and(|o| o.pv_filter_s == new.pv_filter_s)) {
-            commands.push(RigCommand::PvFilter { tag: tag(), time_constant_s: new.pv_filter_s });
-        }
-        if differs(old.is_some_and(|o| o.mode == new.mode)) {
-            commands.push(RigCommand::Mode { tag: tag(), mode: new.mode });
-        }
+        let old = before.loops.get(&active.id).filter(|_| !turned);
+        loop_commands(&active.id, old, new, &mut commands);
     }
     if before.measurement != after.measurement {
         commands.push(RigCommand::Measurement { measurement: after.measurement });
@@ -80,4 +68,40 @@ fn difference(before: &RigSettings, after: &RigSettings) -> Vec<RigCommand> {
         commands.push(RigCommand::Seed { seed: after.seed });
     }
     commands
+}
+
+/// What turns a loop from one state of its settings to another; all of them where there was none.
+fn loop_commands(id: &str, old: Option<&LoopSettings>, new: &LoopSettings, commands: &mut Vec<RigCommand>) {
+    let tag = || id.to_owned();
+    let mode = || RigCommand::Mode { tag: tag(), mode: new.mode };
+    let other_mode = old.is_none_or(|o| o.mode != new.mode);
+    // Out of cascade first: there, the operator's setpoint is refused. Into it last.
+    let leaves_cascade = new.mode != Mode::Cascade && old.is_none_or(|o| o.mode == Mode::Cascade);
+    if other_mode && leaves_cascade {
+        commands.push(mode());
+    }
+    if new.mode != Mode::Cascade && old.is_none_or(|o| o.setpoint_cm != new.setpoint_cm || leaves_cascade) {
+        commands.push(RigCommand::Setpoint { tag: tag(), level_cm: new.setpoint_cm });
+    }
+    let law = old.is_none_or(|o| o.law != new.law).then(|| RigCommand::Law { tag: tag(), law: new.law });
+    let tuning = old
+        .is_none_or(|o| o.tuning != new.tuning)
+        .then(|| RigCommand::Tuning { tag: tag(), tuning: new.tuning });
+    let options = old
+        .is_none_or(|o| o.options != new.options)
+        .then(|| RigCommand::Options { tag: tag(), options: Box::new(new.options.clone()) });
+    // Each step has to be possible with what is still as it was: PID-I2GL needs its integral time before it
+    // comes, the positional PID may get none after it came, and on/off has neither schedule nor feed-forward.
+    let steps = match new.law {
+        Law::PidI2gl { .. } => [tuning, law, options],
+        Law::Pid2gl { .. } => [law, tuning, options],
+        Law::OnOff { .. } => [options, law, tuning],
+    };
+    commands.extend(steps.into_iter().flatten());
+    if old.is_none_or(|o| o.pv_filter_s != new.pv_filter_s) {
+        commands.push(RigCommand::PvFilter { tag: tag(), time_constant_s: new.pv_filter_s });
+    }
+    if other_mode && !leaves_cascade {
+        commands.push(mode());
+    }
 }

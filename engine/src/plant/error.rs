@@ -82,15 +82,33 @@ pub enum RigError {
         /// Tag of the part.
         tag: String,
     },
-    /// Two loops write the same pump.
-    #[error("the loops {first} and {second} both write the pump {pump}")]
+    /// Two loops write the same pump, or the setpoint of the same loop.
+    #[error("the loops {first} and {second} both write {pump}")]
     SharedPump {
         /// One loop.
         first: String,
         /// The other.
         second: String,
-        /// Pump both write.
+        /// Pump or loop both write.
         pump: String,
+    },
+    /// A loop that writes nothing, or two things.
+    #[error("the loop {item} must write one thing: give it either a pump or, with cascade_to, a loop")]
+    Target {
+        /// Tag of the loop.
+        item: String,
+    },
+    /// Loops that write each other's setpoints in a circle.
+    #[error("the cascade from {item} leads to no pump: its loops write each other's setpoints")]
+    CascadeCircle {
+        /// Tag of a loop.
+        item: String,
+    },
+    /// Cascade mode without a loop that gives the setpoint.
+    #[error("{item} cannot be in cascade: no loop writes its setpoint")]
+    NoOuterLoop {
+        /// Tag of the loop.
+        item: String,
     },
     /// Water that does not fit.
     #[error("the reservoir {tank} would start at {} cm: the tanks hold more than water_cm3 or less than the rim allows", number(*.level_cm))]
@@ -128,6 +146,9 @@ impl Explain for RigError {
             Self::Fault { .. } => "rig.fault",
             Self::Sound { .. } => "rig.sound",
             Self::SharedPump { .. } => "rig.shared_pump",
+            Self::Target { .. } => "rig.target",
+            Self::CascadeCircle { .. } => "rig.cascade_circle",
+            Self::NoOuterLoop { .. } => "rig.no_outer_loop",
             Self::Water { .. } => "rig.water",
             Self::Unreachable { .. } => "rig.unreachable",
         }
@@ -153,6 +174,9 @@ impl Explain for RigError {
                 vec![("tag", tag.clone()), ("kind", (*kind).to_owned()), ("possible", possible.clone())]
             }
             Self::Sound { tag } => vec![("tag", tag.clone())],
+            Self::Target { item } | Self::CascadeCircle { item } | Self::NoOuterLoop { item } => {
+                vec![("item", item.clone())]
+            }
             Self::SharedPump { first, second, pump } => {
                 vec![("first", first.clone()), ("second", second.clone()), ("pump", pump.clone())]
             }
@@ -184,6 +208,9 @@ impl RigError {
             Self::Fault { tag: text("FV01"), kind: "stuck", possible: text("clogged") },
             Self::Sound { tag: text("LT02") },
             Self::SharedPump { first: text("LIC-01"), second: text("LIC-02"), pump: text("BA01") },
+            Self::Target { item: text("LIC-01") },
+            Self::CascadeCircle { item: text("LIC-01") },
+            Self::NoOuterLoop { item: text("LIC-01") },
             Self::Water { tank: text("TQ4"), level_cm: -3.5 },
             Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },
         ]

@@ -253,22 +253,7 @@ impl Network {
             self.pump(id).ok_or_else(|| unknown(id))?;
             check_delay(id, delay)?;
         }
-        for (i, spec) in configuration.loops.iter().enumerate() {
-            let sensor = self.sensor(&spec.sensor).ok_or_else(|| unknown(&spec.sensor))?;
-            let pump = self.pump(&spec.pump).ok_or_else(|| unknown(&spec.pump))?;
-            let rim = self.tanks[self.sensors[sensor].tank].height_cm;
-            let on_scale = (0.0..=rim).contains(&spec.setpoint_cm);
-            value(&spec.id, "setpoint_cm", spec.setpoint_cm, on_scale, format!("0…{rim} (rim)"))?;
-            spec.check()?;
-            if let Some(other) = configuration.loops[..i].iter().find(|o| o.pump == spec.pump) {
-                return Err(RigError::SharedPump {
-                    first: other.id.clone(),
-                    second: spec.id.clone(),
-                    pump: self.spec.pumps[pump].id.clone(),
-                });
-            }
-        }
-        Ok(())
+        crate::control::check_loops(self, &configuration.id, &configuration.loops)
     }
 }
 

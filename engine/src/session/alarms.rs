@@ -4,7 +4,6 @@
 //! before it counts, and to be gone as long before it is over; spill, dry pump and broken wire count at once.
 
 use super::event::Alarm;
-use crate::control::Mode;
 use crate::plant::ReadingStatus;
 use crate::sim::ClosedLoop;
 
@@ -81,11 +80,10 @@ impl AlarmTable {
                 Watch::Status(i, status) => {
                     closed.loops().get(i).is_some_and(|l| closed.readings()[l.sensor].status == status)
                 }
-                Watch::Limit(i) => closed.loops().get(i).is_some_and(|l| {
-                    let pump = &closed.network().pumps[l.pump];
-                    let mv = l.control.mv();
-                    l.control.mode == Mode::Automatic && (mv <= pump.min || mv >= pump.max)
-                }),
+                Watch::Limit(i) => closed
+                    .loops()
+                    .get(i)
+                    .is_some_and(|l| l.control.mode.is_controlling() && l.control.at_limit().is_some()),
             };
             row.differing = if now == row.on { 0 } else { row.differing + 1 };
             if row.differing >= row.needed {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::{GainsError, Mode, PidTuning};
+use crate::control::{GainsError, Law, LoopOptions, Mode, PidTuning};
 use crate::explain::{Explain, number};
 use crate::plant::{Fault, FaultKind, Measurement, RigError};
 
@@ -17,7 +17,7 @@ pub enum RigCommand {
         /// Setpoint in cm.
         level_cm: f64,
     },
-    /// Manual or automatic.
+    /// Manual, automatic or cascade.
     Mode {
         /// Loop.
         tag: String,
@@ -37,6 +37,20 @@ pub enum RigCommand {
         tag: String,
         /// Gains and weights.
         tuning: PidTuning,
+    },
+    /// Another law of a loop, or other settings of its law; the output goes on from where it is.
+    Law {
+        /// Loop.
+        tag: String,
+        /// The law with its settings.
+        law: Law,
+    },
+    /// What stands around the law of a loop: limits, setpoint path, deadband, schedule, feed-forward, predictor.
+    Options {
+        /// Loop.
+        tag: String,
+        /// All of it; what is left out is off.
+        options: Box<LoopOptions>,
     },
     /// New PV filter of a loop.
     PvFilter {
@@ -138,6 +152,20 @@ pub enum CommandError {
         /// The fault.
         kind: &'static str,
     },
+    /// A setpoint sent to a loop that takes it from another.
+    #[error("{tag} is in cascade and takes its setpoint from another loop; switch it to automatic first")]
+    Cascade {
+        /// Loop.
+        tag: String,
+    },
+    /// An output sent to an outer loop that follows its inner loop's setpoint.
+    #[error("{tag} follows the setpoint of {inner}; switch {inner} to cascade first")]
+    Follows {
+        /// Outer loop.
+        tag: String,
+        /// Inner loop.
+        inner: String,
+    },
     /// A valve, tank or configuration of something that has none.
     #[error("this source has no valves or tanks that can be set from here")]
     NotARig,
@@ -158,6 +186,8 @@ impl Explain for CommandError {
             Self::Setpoint { .. } => "command.setpoint",
             Self::Automatic { .. } => "command.automatic",
             Self::Faulty { .. } => "command.faulty",
+            Self::Cascade { .. } => "command.cascade",
+            Self::Follows { .. } => "command.follows",
             Self::NotARig => "command.not_a_rig",
             Self::Speed { .. } => "command.speed",
         }
@@ -167,7 +197,10 @@ impl Explain for CommandError {
         match self {
             Self::Rig(error) => error.args(),
             Self::Gains(error) => error.args(),
-            Self::UnknownTag { tag } | Self::Automatic { tag } => vec![("tag", tag.clone())],
+            Self::UnknownTag { tag } | Self::Automatic { tag } | Self::Cascade { tag } => {
+                vec![("tag", tag.clone())]
+            }
+            Self::Follows { tag, inner } => vec![("tag", tag.clone()), ("inner", inner.clone())],
             Self::Setpoint { tag, level_cm, rim_cm } => {
                 vec![("tag", tag.clone()), ("level_cm", number(*level_cm)), ("rim_cm", number(*rim_cm))]
             }
@@ -188,6 +221,8 @@ impl CommandError {
             Self::Setpoint { tag: tag(), level_cm: 31.0, rim_cm: 27.0 },
             Self::Automatic { tag: tag() },
             Self::Faulty { tag: "TQ1".to_owned(), kind: "leak" },
+            Self::Cascade { tag: tag() },
+            Self::Follows { tag: tag(), inner: "LIC-03".to_owned() },
             Self::NotARig,
             Self::Speed { speed: -3.0 },
         ]

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::event::Alarm;
-use crate::control::{Mode, PidTuning};
+use crate::control::{Action, Bound, ControlOutput, Law, Limits, Mode, PidTuning};
 use crate::plant::{ActiveFault, Balance, Measurement, Network, ReadingStatus};
+use crate::sim::LoopTarget;
 
 /// A tank now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,22 +47,44 @@ pub struct LoopNow {
     pub tag: String,
     /// Sensor's index in the network.
     pub sensor: usize,
-    /// Pump's index in the network.
+    /// Index in the network of the pump that it moves, through inner loops where there are some.
     pub pump: usize,
+    /// What takes the output.
+    pub target: LoopTarget,
+    /// Index of the loop that gives the setpoint in cascade.
+    pub outer: Option<usize>,
     /// Measured PV in cm; NaN before the first sample.
     pub pv_cm: f64,
     /// What the reading is worth.
     pub status: ReadingStatus,
     /// Setpoint in cm.
     pub setpoint_cm: f64,
-    /// Output in the pump's unit.
+    /// Setpoint as the law sees it, after ramp and filter, in cm.
+    pub working_setpoint_cm: f64,
+    /// Output in the pump's unit; in cm where it is another loop's setpoint.
     pub mv: f64,
-    /// Who writes it.
+    /// Range of what takes the output.
+    pub range: Limits,
+    /// Limits of the output.
+    pub limits: Limits,
+    /// Limit at which the output stands.
+    pub at_limit: Option<Bound>,
+    /// Mode that was asked for.
     pub mode: Mode,
-    /// Gains and weights in use.
+    /// Mode of the last sample: an outer loop waits in manual until its inner loop is in cascade.
+    pub actual: Mode,
+    /// The law with its settings.
+    pub law: Law,
+    /// Direction of the loop.
+    pub action: Action,
+    /// Gains and weights as set.
     pub tuning: PidTuning,
+    /// Gains and weights at the present level, schedule included.
+    pub tuning_now: PidTuning,
     /// Time constant of the PV filter in seconds.
     pub pv_filter_s: f64,
+    /// What the last sample came to: terms of the law, increment asked for, limit that cut it, output held.
+    pub last: ControlOutput,
 }
 
 /// Everything a view needs of the present.

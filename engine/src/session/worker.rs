@@ -12,6 +12,7 @@ use super::event::{Event, EventKind};
 use super::sink::Sink;
 use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 use super::{Notify, Rig, SessionCommand};
+use crate::control::Limits;
 use crate::plant::{Measurement, Plant};
 use crate::signal::SampleBlock;
 use crate::sim::ClosedLoop;
@@ -403,13 +404,24 @@ fn loop_now(l: &crate::sim::ActiveLoop, closed: &ClosedLoop) -> LoopNow {
         tag: l.spec.id.clone(),
         sensor: l.sensor,
         pump: l.pump,
+        target: l.target,
+        outer: l.outer,
         pv_cm: reading.level_cm,
         status: reading.status,
         setpoint_cm: l.control.setpoint_cm,
+        working_setpoint_cm: l.control.working_setpoint_cm(),
         mv: l.control.mv(),
+        range: Limits { low: l.range.low, high: l.range.high },
+        limits: l.control.limits(),
+        at_limit: l.control.at_limit(),
         mode: l.control.mode,
+        actual: l.control.actual_mode(),
+        law: *l.control.law(),
+        action: l.control.law().action(&l.control.tuning()),
         tuning: l.control.tuning(),
+        tuning_now: l.control.scheduled_tuning(),
         pv_filter_s: l.control.pv_filter_s(),
+        last: *l.control.last(),
     }
 }
 

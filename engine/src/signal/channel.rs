@@ -54,14 +54,18 @@ impl ChannelSet {
     pub fn of(network: &Network) -> Self {
         let spec = &network.spec;
         let slots = spec.configurations.iter().map(|c| c.loops.len()).max().unwrap_or(0);
-        let mv_unit = spec.pumps.first().map_or("", |p| p.unit.symbol());
+        let mv_unit = |slot: usize| {
+            let in_slot = spec.configurations.iter().find_map(|c| c.loops.get(slot));
+            let level = in_slot.is_some_and(|l| l.cascade_to.is_some());
+            if level { "cm" } else { spec.pumps.first().map_or("", |p| p.unit.symbol()) }
+        };
         let mut channels = Vec::new();
         let mut push = |name: String, unit, kind| channels.push(Channel { name, unit, kind });
         for slot in 0..slots {
             let number = if slots > 1 { (slot + 1).to_string() } else { String::new() };
             push(format!("sp{number}"), "cm", ChannelKind::Setpoint(slot));
             push(format!("pv{number}"), "cm", ChannelKind::Pv(slot));
-            push(format!("mv{number}"), mv_unit, ChannelKind::Mv(slot));
+            push(format!("mv{number}"), mv_unit(slot), ChannelKind::Mv(slot));
         }
         for (i, tank) in spec.tanks.iter().enumerate() {
             push(format!("{}_cm", tank.signal), "cm", ChannelKind::Level(i));

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::control::{ControlLoop, LoopSpec, Mode, check_filter};
+use super::active_loop::{ActiveLoop, LoopTarget, sample};
+use crate::control::{LoopSpec, Mode, check_filter, check_loop, execution_order, outer_of};
 use crate::daq::{RigControls, SimulatedRig, Source};
 use crate::plant::{
     ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, SteadyState,
@@ -10,21 +11,6 @@ use crate::plant::{
 };
 use crate::session::{CommandError, RigCommand};
 use crate::signal::{ChannelKind, ChannelSet};
-
-/// A loop of the present configuration with its place in the rig.
-#[derive(Debug, Clone)]
-pub struct ActiveLoop {
-    /// Its description, kept up to date with what the operator set.
-    pub spec: LoopSpec,
-    /// Sensor that gives the PV.
-    pub sensor: usize,
-    /// Pump that takes the MV.
-    pub pump: usize,
-    /// Controller, setpoint and mode.
-    pub control: ControlLoop,
-    /// The last output was held because the input was not a number.
-    pub held: bool,
-}
 
 /// A source under control.
 pub struct ClosedLoop {
@@ -34,6 +20,10 @@ pub struct ClosedLoop {
     configuration: usize,
     settings: Vec<Vec<LoopSpec>>,
     loops: Vec<ActiveLoop>,
+    /// Indices of the loops, outer ones first.
+    order: Vec<usize>,
+    /// Inputs of the pumps as last written.
+    inputs: Vec<f64>,
     readings: Vec<Reading>,
     row: Vec<f64>,
     sample_time_s: f64,
@@ -74,13 +64,15 @@ impl ClosedLoop {
             row: vec![f64::NAN; width],
             sample_time_s: network.spec.sample_time_s,
             loops: Vec::new(),
+            order: Vec::new(),
+            inputs: network.pumps.iter().map(|p| p.min).collect(),
             samples: 0,
             configuration,
             source,
             network,
             channels,
         };
-        closed.loops = closed.make_loops(configuration, &[]);
+        closed.make_loops(None);
         closed
     }
 
@@ -147,13 +139,17 @@ impl ClosedLoop {
     /// at the sample's time; flows are the means of the sample before it.
     pub fn step(&mut self) -> &[f64] {
         self.source.read(&mut self.readings);
-        for active in &mut self.loops {
-            let output = active.control.update(self.readings[active.sensor].level_cm);
-            active.held = output.held;
-            if let Ok(written) = self.source.write(active.pump, output.mv)
-                && written != output.mv
-            {
-                active.control.set_mv(written);
+        for &index in &self.order {
+            sample(&mut self.loops, index, &self.readings, &self.inputs);
+            let active = &mut self.loops[index];
+            if let LoopTarget::Pump(pump) = active.target {
+                let mv = active.control.mv();
+                if let Ok(written) = self.source.write(pump, mv) {
+                    self.inputs[pump] = written;
+                    if written != mv {
+                        active.control.applied(written);
+                    }
+                }
             }
         }
         self.fill_row();
@@ -187,22 +183,30 @@ impl ClosedLoop {
         }
     }
 
-    /// Loops of a configuration at the present outputs; `modes`, slot by slot, go before those of the settings.
-    fn make_loops(&self, configuration: usize, modes: &[Mode]) -> Vec<ActiveLoop> {
-        let Some(settings) = self.settings.get(configuration) else { return Vec::new() };
-        settings
-            .iter()
-            .enumerate()
-            .filter_map(|(slot, spec)| {
-                let (sensor, pump) = (self.network.sensor(&spec.sensor)?, self.network.pump(&spec.pump)?);
-                let p = &self.network.pumps[pump];
-                let mv = self.source.plant().map_or(p.min, |plant| plant.inputs()[pump]);
-                let mut spec = spec.clone();
-                spec.mode = modes.get(slot).copied().unwrap_or(spec.mode);
-                let control = ControlLoop::new(&spec, self.sample_time_s, p.min, p.max, mv);
-                Some(ActiveLoop { spec, sensor, pump, control, held: false })
-            })
-            .collect()
+    /// Makes the loops of the present configuration at the present outputs. `modes` are those of a configuration
+    /// before, slot by slot: they go before those of the settings, and the loops take over without a jump.
+    fn make_loops(&mut self, modes: Option<&[Mode]>) {
+        if let Some(plant) = self.source.plant() {
+            self.inputs.copy_from_slice(plant.inputs());
+        }
+        let mut specs = self.settings.get(self.configuration).cloned().unwrap_or_default();
+        for slot in 0..specs.len() {
+            if let Some(&mode) = modes.and_then(|m| m.get(slot)) {
+                specs[slot].mode = mode_in(&specs, slot, mode);
+            }
+        }
+        let (h, inputs) = (self.sample_time_s, &self.inputs);
+        let made =
+            (0..specs.len()).map(|i| ActiveLoop::new(&self.network, &specs, i, h, |pump| inputs[pump]));
+        // A checked network has all its loops; without one of them, the indices of the others mean nothing.
+        self.loops = made.collect::<Option<_>>().unwrap_or_default();
+        if modes.is_some() {
+            for active in &mut self.loops {
+                active.control = active.control.clone().taking_over();
+            }
+        }
+        self.order = execution_order(&specs);
+        self.order.truncate(self.loops.len());
     }
 
     fn find(&mut self, tag: &str) -> Result<&mut ActiveLoop, CommandError> {
@@ -218,20 +222,22 @@ impl ClosedLoop {
         let unknown = |tag: &str| CommandError::UnknownTag { tag: tag.to_owned() };
         match command {
             RigCommand::Setpoint { tag, level_cm } => self.set_setpoint(tag, *level_cm)?,
-            RigCommand::Mode { tag, mode } => {
-                let active = self.find(tag)?;
-                active.control.mode = *mode;
-                active.spec.mode = *mode;
-            }
+            RigCommand::Mode { tag, mode } => self.set_mode(tag, *mode)?,
             RigCommand::Mv { tag, value } => self.set_mv(tag, *value)?,
             RigCommand::Tuning { tag, tuning } => {
-                let tuning = tuning.validated()?;
-                let active = self.find(tag)?;
-                active.control.set_tuning(tuning);
-                let g = tuning.gains;
-                let spec = &mut active.spec;
-                (spec.kc, spec.ti_s, spec.td_s, spec.n) = (g.kc, g.ti_s, g.td_s, g.n);
-                (spec.b, spec.c) = (tuning.b, tuning.c);
+                tuning.validated(&self.find(tag)?.spec.law)?;
+                let active = self.change(tag, |spec| spec.set_tuning(*tuning))?;
+                active.control.set_tuning(*tuning);
+            }
+            RigCommand::Law { tag, law } => {
+                let active = self.change(tag, |spec| spec.law = *law)?;
+                active.control.set_law(*law);
+            }
+            RigCommand::Options { tag, options } => {
+                let network = self.network.clone();
+                let active = self.change(tag, |spec| spec.options.clone_from(options))?;
+                active.control.set_options((**options).clone());
+                active.find_disturbance(&network);
             }
             RigCommand::PvFilter { tag, time_constant_s } => {
                 let filter_s = check_filter(*time_constant_s)?;
@@ -266,9 +272,34 @@ impl ClosedLoop {
         Ok(())
     }
 
+    /// Changes the description of a loop when the rig allows it.
+    fn change(
+        &mut self,
+        tag: &str,
+        change: impl FnOnce(&mut LoopSpec),
+    ) -> Result<&mut ActiveLoop, CommandError> {
+        let mut changed = self.find(tag)?.spec.clone();
+        change(&mut changed);
+        let specs: Vec<LoopSpec> = self.loops.iter().map(|l| l.spec.clone()).collect();
+        check_loop(&self.network, &specs, &changed)?;
+        let active = self.find(tag)?;
+        active.spec = changed;
+        Ok(active)
+    }
+
+    fn set_mode(&mut self, tag: &str, mode: Mode) -> Result<(), CommandError> {
+        let setpoint_cm = self.find(tag)?.control.setpoint_cm;
+        let active = self.change(tag, |spec| (spec.mode, spec.setpoint_cm) = (mode, setpoint_cm))?;
+        active.control.mode = mode;
+        Ok(())
+    }
+
     fn set_setpoint(&mut self, tag: &str, level_cm: f64) -> Result<(), CommandError> {
         let network = self.network.clone();
         let active = self.find(tag)?;
+        if active.control.mode == Mode::Cascade {
+            return Err(CommandError::Cascade { tag: tag.to_owned() });
+        }
         let rim_cm = network.tanks[network.sensors[active.sensor].tank].height_cm;
         if !(0.0..=rim_cm).contains(&level_cm) {
             return Err(CommandError::Setpoint { tag: tag.to_owned(), level_cm, rim_cm });
@@ -286,16 +317,25 @@ impl ClosedLoop {
         if !value.is_finite() {
             return Err(finite(tag).into());
         }
-        let pump = self.network.pump(tag);
-        if let Some(active) = self.loops.iter_mut().find(|l| l.spec.id == tag || Some(l.pump) == pump) {
-            if active.control.mode == Mode::Automatic {
+        let pump = self.network.pump(tag).map(LoopTarget::Pump);
+        if let Some(index) = self.loops.iter().position(|l| l.spec.id == tag || Some(l.target) == pump) {
+            let active = &self.loops[index];
+            if active.control.mode.is_controlling() {
                 return Err(CommandError::Automatic { tag: active.spec.id.clone() });
             }
-            active.control.set_mv(value);
+            if let LoopTarget::Loop(inner) = active.target
+                && self.loops[inner].control.mode != Mode::Cascade
+            {
+                let inner = self.loops[inner].spec.id.clone();
+                return Err(CommandError::Follows { tag: tag.to_owned(), inner });
+            }
+            self.loops[index].control.set_mv(value);
             return Ok(());
         }
-        let pump = pump.ok_or_else(|| CommandError::UnknownTag { tag: tag.to_owned() })?;
-        self.source.write(pump, value)?;
+        let Some(LoopTarget::Pump(pump)) = pump else {
+            return Err(CommandError::UnknownTag { tag: tag.to_owned() });
+        };
+        self.inputs[pump] = self.source.write(pump, value)?;
         Ok(())
     }
 
@@ -311,7 +351,7 @@ impl ClosedLoop {
             *kept = self.loops.iter().map(|l| l.spec.clone()).collect();
         }
         self.configuration = configuration;
-        self.loops = self.make_loops(configuration, &modes);
+        self.make_loops(Some(&modes));
         Ok(())
     }
 
@@ -359,9 +399,19 @@ impl ClosedLoop {
 
     fn rest(&mut self, state: &SteadyState) -> Result<(), CommandError> {
         self.source.rig().ok_or(CommandError::NotARig)?.set_state(&state.levels_cm, &state.inputs)?;
-        for active in &mut self.loops {
-            let (p, mv) = (&self.network.pumps[active.pump], state.inputs[active.pump]);
-            active.control = ControlLoop::new(&active.spec, self.sample_time_s, p.min, p.max, mv);
+        self.inputs.copy_from_slice(&state.inputs);
+        for index in 0..self.loops.len() {
+            let level_cm = |l: &ActiveLoop| state.levels_cm[self.network.sensors[l.sensor].tank];
+            let mv = match self.loops[index].target {
+                LoopTarget::Pump(pump) => state.inputs[pump],
+                LoopTarget::Loop(inner) => level_cm(&self.loops[inner]),
+            };
+            let own_cm = level_cm(&self.loops[index]);
+            let active = &mut self.loops[index];
+            active.rest(self.sample_time_s, mv);
+            if active.control.mode == Mode::Cascade {
+                active.control.setpoint_cm = own_cm;
+            }
         }
         Ok(())
     }
@@ -373,10 +423,31 @@ impl ClosedLoop {
         for _ in 0..sweeps {
             for i in 0..self.loops.len() {
                 let l = &self.loops[i];
+                if !self.decides(i) {
+                    continue;
+                }
                 let state = self.steady(l.pump, l.sensor, l.control.setpoint_cm)?;
                 self.rest(&state)?;
             }
         }
         Ok(())
     }
+
+    /// Whether the setpoint of a loop decides where its pump comes to rest: it is its own, and every loop between
+    /// it and the pump takes its setpoint from outside.
+    fn decides(&self, index: usize) -> bool {
+        let mut target = self.loops[index].target;
+        while let LoopTarget::Loop(inner) = target {
+            if self.loops[inner].control.mode != Mode::Cascade {
+                return false;
+            }
+            target = self.loops[inner].target;
+        }
+        self.loops[index].control.mode != Mode::Cascade
+    }
+}
+
+/// A mode as it is possible in a slot: cascade needs a loop that gives the setpoint.
+fn mode_in(specs: &[LoopSpec], slot: usize, mode: Mode) -> Mode {
+    if mode == Mode::Cascade && outer_of(specs, &specs[slot].id).is_none() { Mode::Automatic } else { mode }
 }

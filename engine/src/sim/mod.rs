@@ -1,9 +1,11 @@
 //! Simulation at the sample time: the rig with its loops, and scenarios.
 
+mod active_loop;
 mod closed_loop;
 mod scenario;
 mod start;
 
-pub use closed_loop::{ActiveLoop, ClosedLoop};
+pub use active_loop::{ActiveLoop, LoopTarget};
+pub use closed_loop::ClosedLoop;
 pub use scenario::{Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario};
 pub use start::{StartError, check_starts};

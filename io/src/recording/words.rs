@@ -39,6 +39,9 @@ fn done(command: &RigCommand) -> String {
         RigCommand::Setpoint { tag, level_cm } => format!("{tag}: setpoint {} cm", number(*level_cm)),
         RigCommand::Mode { tag, mode: Mode::Manual } => format!("{tag}: manual"),
         RigCommand::Mode { tag, mode: Mode::Automatic } => format!("{tag}: automatic"),
+        RigCommand::Mode { tag, mode: Mode::Cascade } => format!("{tag}: cascade"),
+        RigCommand::Law { tag, law } => format!("{tag}: law {}", law.id()),
+        RigCommand::Options { tag, .. } => format!("{tag}: other options around its law"),
         RigCommand::Mv { tag, value } => format!("{tag}: output {}", number(*value)),
         RigCommand::Tuning { tag, tuning } => {
             let g = tuning.gains;

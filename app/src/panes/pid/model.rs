@@ -1,7 +1,6 @@
 //! What the P&ID shows: the snapshot laid out, ready to paint and to test.
 
 use eframe::egui::{Pos2, Rect, pos2};
-use vasos_engine::control::Mode;
 use vasos_engine::plant::ReadingStatus;
 use vasos_engine::session::{Alarm, Snapshot};
 
@@ -163,7 +162,7 @@ impl PidModel {
             .map(|i| {
                 let now = &snapshot.pumps[i];
                 let suction = Route { pipe: layout.suctions[i].clone(), falls_into: None, to_outside: false };
-                let automatic = snapshot.loops.iter().any(|l| l.pump == i && l.mode == Mode::Automatic);
+                let automatic = snapshot.loops.iter().any(|l| l.pump == i && l.mode.is_controlling());
                 PumpView {
                     tag: spec.pumps[i].id.clone(),
                     at: frame.point(layout.pumps[i]),
@@ -196,7 +195,7 @@ fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankVi
         Some(to) => frame.rect(layout.tanks[to]).top(),
         None => rect.bottom() + 14.0,
     };
-    let loops = snapshot.loops.iter().filter(|l| l.mode == Mode::Automatic);
+    let loops = snapshot.loops.iter().filter(|l| l.mode.is_controlling());
     let held = loops.into_iter().find(|l| snapshot.network.sensors[l.sensor].tank == i);
     TankView {
         tag: snapshot.network.spec.tanks[i].id.clone(),
@@ -238,7 +237,7 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             at: frame.point(controller),
             abnormal: false,
             mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some(),
-            automatic: Some(now.mode == Mode::Automatic),
+            automatic: Some(now.mode.is_controlling()),
         });
         let down = snapshot.network.pumps[now.pump].from.is_some();
         let corner = if down { pos2(controller.x, pump.y - 0.06) } else { pos2(controller.x, pump.y - 0.14) };
