@@ -10,8 +10,8 @@ use vasos_engine::control::GainsError;
 use vasos_engine::document::DocumentError;
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{FitError, FitVerdict};
-use vasos_engine::model::ModelError;
-use vasos_engine::plant::RigError;
+use vasos_engine::model::{ModelError, StateSpaceError};
+use vasos_engine::plant::{LinearError, RigError};
 use vasos_engine::session::{Alarm, CommandError};
 use vasos_engine::signal::ExpressionError;
 use vasos_engine::sim::ScenarioError;
@@ -204,6 +204,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
     ];
     vec![
         ("RigError", boxed(RigError::samples())),
+        ("LinearError", boxed(LinearError::samples())),
+        ("StateSpaceError", boxed(StateSpaceError::samples())),
         ("GainsError", boxed(GainsError::samples())),
         ("ModelError", boxed(ModelError::samples())),
         ("CommandError", boxed(CommandError::samples())),

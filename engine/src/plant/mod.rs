@@ -6,19 +6,27 @@
 
 mod error;
 mod flow_law;
+mod flows;
 mod integrator;
+mod linear;
+mod linear_error;
 mod names;
 mod network;
 mod pipe;
+mod pump_curve;
 mod sensor;
 pub mod spec;
 mod state;
 mod steady;
+mod steady_solver;
 
 pub use error::RigError;
 pub use flow_law::{regularised_root, regularised_root_slope};
+pub use linear::{Disturbances, LinearOptions, Linearisation, OperatingPoint, linearise};
+pub use linear_error::LinearError;
 pub use network::{Network, Pump, RIG_SCHEMA, Sensor, Tank, Valve};
+pub use pump_curve::CurveSide;
 pub use sensor::{Measurement, Reading, ReadingStatus, Transmitter};
 pub use spec::{InputUnit, RigSpec, Text};
 pub use state::{Balance, Plant};
-pub use steady::{SteadyState, steady_at_level, steady_levels};
+pub use steady::{SteadyState, SteadyTarget, steady_at_level, steady_at_levels, steady_levels, unrest_cm_s};

@@ -338,7 +338,13 @@ fn outlets(
             return Err(RigError::Loop { item: pump.id.clone(), tank: id.clone() });
         }
         let left = outlets[0].1;
-        value(&pump.id, "split", share, share > 0.0 && share <= left, format!("> 0 and together ≤ 1 ({id})"))?;
+        value(
+            &pump.id,
+            "split",
+            share,
+            share > 0.0 && share <= left,
+            format!("> 0 and together ≤ 1 ({id})"),
+        )?;
         outlets[0].1 = left - share;
         outlets.push((tank, share));
     }
