@@ -8,18 +8,26 @@
 //! Policy for non-finite numbers: a model that holds one is refused by its constructor.
 
 mod eigen;
+mod half_rule;
 mod process_model;
 pub(crate) mod realization;
+mod reduce_error;
 pub(crate) mod roots;
+mod simulate;
 mod state_space;
 mod state_space_error;
+mod step_fit;
 mod structure;
 mod transfer_function;
 mod zero_pole_gain;
 mod zeros;
 
+pub use half_rule::{ReducedOrder, half_rule};
 pub use process_model::{Fopdt, Ipdt, ModelError, ProcessModel, Sopdt};
+pub use reduce_error::ReduceError;
+pub use simulate::{SampledInput, simulate, simulate_process};
 pub use state_space::{Matrices, Port, Ports, StateSpace};
 pub use state_space_error::StateSpaceError;
+pub use step_fit::{StepFit, fit_step_response};
 pub use transfer_function::TransferFunction;
 pub use zero_pole_gain::ZeroPoleGain;

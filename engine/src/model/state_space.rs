@@ -102,10 +102,8 @@ impl StateSpace {
         Ok(Self { a, b, c, d, input_delays_s, ports })
     }
 
-    /// The state space of a transfer function from one input to one output; controllable canonical form with states
-    /// scaled by the poles' mean modulus.
-    #[must_use]
-    pub fn of_transfer_function(tf: &TransferFunction, input: Port, output: Port) -> Self {
+    /// The state space of a proper transfer function.
+    pub(super) fn of_proper(tf: &TransferFunction, input: Port, output: Port) -> Self {
         let realization = Realization::new(&tf.num, &tf.den);
         let n = realization.order();
         let mut b = DMatrix::zeros(n, 1);
