@@ -19,11 +19,15 @@ pub struct Preset {
 }
 
 /// The presets, the first being the one that opens.
-pub const PRESETS: [Preset; 4] = [
+pub const PRESETS: [Preset; 8] = [
     Preset { id: "stad", text: include_str!("../../assets/rigs/stad.toml") },
     Preset { id: "simtank1", text: include_str!("../../assets/rigs/simtank1.toml") },
     Preset { id: "simtank2", text: include_str!("../../assets/rigs/simtank2.toml") },
     Preset { id: "simtank3", text: include_str!("../../assets/rigs/simtank3.toml") },
+    Preset { id: "cascade", text: include_str!("../../assets/rigs/cascade.toml") },
+    Preset { id: "quadruple_minimum", text: include_str!("../../assets/rigs/quadruple_minimum.toml") },
+    Preset { id: "quadruple_nonminimum", text: include_str!("../../assets/rigs/quadruple_nonminimum.toml") },
+    Preset { id: "coupled_tanks", text: include_str!("../../assets/rigs/coupled_tanks.toml") },
 ];
 
 /// Why a rig or scenario file cannot be used.

@@ -10,11 +10,11 @@ use vasos_engine::control::{FormError, GainsError};
 use vasos_engine::document::DocumentError;
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{FitError, FitVerdict};
-use vasos_engine::model::ModelError;
-use vasos_engine::plant::RigError;
+use vasos_engine::model::{ModelError, ReduceError, StateSpaceError};
+use vasos_engine::plant::{LinearError, RigError};
 use vasos_engine::session::{Alarm, CommandError};
 use vasos_engine::signal::ExpressionError;
-use vasos_engine::sim::ScenarioError;
+use vasos_engine::sim::{CompareError, ScenarioError};
 use vasos_engine::tune::{RuleError, RuleWarning, registry};
 use vasos_io::log::{ImportError, Repair};
 use vasos_io::recording::{RecordingError, RecordingTrouble};
@@ -204,6 +204,10 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
     ];
     vec![
         ("RigError", boxed(RigError::samples())),
+        ("CompareError", boxed(CompareError::samples())),
+        ("LinearError", boxed(LinearError::samples())),
+        ("ReduceError", boxed(ReduceError::samples())),
+        ("StateSpaceError", boxed(StateSpaceError::samples())),
         ("GainsError", boxed(GainsError::samples())),
         ("FormError", boxed(FormError::samples())),
         ("ModelError", boxed(ModelError::samples())),

@@ -75,7 +75,10 @@ fn the_drawing_shows_what_is() {
             assert_eq!(view.angle_deg, now.angle_deg);
         }
         for (view, now) in model.pumps.iter().zip(&snapshot.pumps) {
-            assert_eq!(view.discharge.flow_cm3_s, now.arriving_cm3_s);
+            assert_eq!(view.arriving_cm3_s, now.arriving_cm3_s);
+            let drawn: f64 =
+                std::iter::once(&view.discharge).chain(&view.branches).map(|s| s.flow_cm3_s).sum();
+            assert!((drawn - now.arriving_cm3_s).abs() < 1e-12);
         }
         for (view, now) in model.tanks.iter().zip(&snapshot.tanks) {
             assert_eq!(view.level_cm, now.level_cm);

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::OpenLoop;
-use super::realization::{Hermite, Realization, Step};
+use crate::model::realization::{Hermite, Realization, Step};
 
 /// What acts on the loop from t = 0: setpoint r with its weights b and c, and a load at the process input.
 #[derive(Debug, Clone, Copy)]

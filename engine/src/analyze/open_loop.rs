@@ -3,9 +3,9 @@
 use num_complex::Complex64;
 
 use super::grid::features;
-use super::roots::{at_j_omega, product, push_roots};
 use crate::control::PidGains;
 use crate::model::ProcessModel;
+use crate::model::roots::{at_j_omega, product, push_roots};
 
 /// `L(s) = G(s) C(s)` with G's dead time exact and `C = Kc (1 + 1/(Ti s) + Td s/(1 + s Td/N))`.
 ///

@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use num_complex::Complex64;
 
 use super::OpenLoop;
-use super::roots::{at_j_omega, product, push_positive_roots};
+use crate::model::roots::{at_j_omega, product, push_positive_roots};
 
 /// Distance of L(jω) from −1 under which a unit crossing counts as lying on it: the loop oscillates for ever.
 const ON_THE_CRITICAL_POINT: f64 = 1e-12;

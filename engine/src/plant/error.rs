@@ -130,6 +130,24 @@ pub enum RigError {
         /// Highest level the input range can hold, in cm.
         highest_cm: f64,
     },
+    /// Levels for which a pump would have to deliver what it cannot.
+    #[error("these levels cannot be held together: {pump} would have to deliver {} cm³/s and delivers {} to {}", number(*.needed_cm3_s), number(*.lowest_cm3_s), number(*.highest_cm3_s))]
+    OutOfReach {
+        /// Pump.
+        pump: String,
+        /// Flow it would have to deliver, in cm³/s.
+        needed_cm3_s: f64,
+        /// Lowest flow its input range gives, in cm³/s.
+        lowest_cm3_s: f64,
+        /// Highest flow, in cm³/s.
+        highest_cm3_s: f64,
+    },
+    /// Levels that no flows of the free pumps hold.
+    #[error("no flows of these pumps hold {tanks} at these levels together: does every pump reach its tank?")]
+    NoBalance {
+        /// Tanks.
+        tanks: String,
+    },
 }
 
 impl Explain for RigError {
@@ -151,6 +169,8 @@ impl Explain for RigError {
             Self::NoOuterLoop { .. } => "rig.no_outer_loop",
             Self::Water { .. } => "rig.water",
             Self::Unreachable { .. } => "rig.unreachable",
+            Self::OutOfReach { .. } => "rig.out_of_reach",
+            Self::NoBalance { .. } => "rig.no_balance",
         }
     }
 
@@ -187,6 +207,13 @@ impl Explain for RigError {
                 ("lowest_cm", number(*lowest_cm)),
                 ("highest_cm", number(*highest_cm)),
             ],
+            Self::OutOfReach { pump, needed_cm3_s, lowest_cm3_s, highest_cm3_s } => vec![
+                ("pump", pump.clone()),
+                ("needed_cm3_s", number(*needed_cm3_s)),
+                ("lowest_cm3_s", number(*lowest_cm3_s)),
+                ("highest_cm3_s", number(*highest_cm3_s)),
+            ],
+            Self::NoBalance { tanks } => vec![("tanks", tanks.clone())],
         }
     }
 }
@@ -213,6 +240,13 @@ impl RigError {
             Self::NoOuterLoop { item: text("LIC-01") },
             Self::Water { tank: text("TQ4"), level_cm: -3.5 },
             Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },
+            Self::OutOfReach {
+                pump: text("BA01"),
+                needed_cm3_s: 120.5,
+                lowest_cm3_s: 0.0,
+                highest_cm3_s: 77.9,
+            },
+            Self::NoBalance { tanks: text("TQ1, TQ2") },
         ]
     }
 }

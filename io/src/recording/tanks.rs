@@ -69,23 +69,13 @@ impl Tanks {
             labels.push(valve.id.clone());
             colors.push(Color::from_rgb(130, 140, 155));
         }
-        for pump in &network.spec.pumps {
-            let Some(to) = network.tank(&pump.to).map(|i| self.places[i]) else { continue };
-            let from = pump.from.as_ref().and_then(|id| network.tank(id)).map(|i| self.places[i]);
-            let over = to.top - 8.0;
-            let x = to.left + 0.25 * to.width;
-            let mut strip = match from {
-                Some(from) => {
-                    let side = from.left.min(to.left) - 8.0;
-                    let y = from.bottom() - 4.0;
-                    vec![[from.left, y], [side, y], [side, over]]
-                }
-                None => vec![[to.left - 10.0, over]],
-            };
-            strip.extend([[x, over], [x, to.top + 1.0]]);
-            strips.push(strip);
-            labels.push(pump.id.clone());
-            colors.push(Color::from_rgb(110, 205, 130));
+        for (pump, spec) in network.pumps.iter().zip(&network.spec.pumps) {
+            let from = pump.from.map(|i| self.places[i]);
+            for (outlet, &(tank, _)) in pump.outlets.iter().enumerate() {
+                strips.push(pump_pipe(from, self.places[tank], outlet));
+                labels.push(spec.id.clone());
+                colors.push(Color::from_rgb(110, 205, 130));
+            }
         }
         LineStrips2D::new(strips).with_labels(labels).with_show_labels(true).with_colors(colors)
     }
@@ -142,6 +132,23 @@ fn place(network: &Network, tank: usize) -> Place {
     let height = spec.height_cm as f32;
     let bottom = row as f32 * ROW;
     Place { left: column as f32 * COLUMN - width / 2.0, top: bottom - height, width, height }
+}
+
+/// From a tank, or from outside, over the rim of the one it feeds; pipes of one pump run side by side.
+fn pump_pipe(from: Option<Place>, to: Place, outlet: usize) -> Vec<[f32; 2]> {
+    let aside = 2.0 * outlet as f32;
+    let over = to.top - 8.0 - aside;
+    let x = to.left + 0.25 * to.width + aside;
+    let mut strip = match from {
+        Some(from) => {
+            let side = from.left.min(to.left) - 8.0 - aside;
+            let y = from.bottom() - 4.0;
+            vec![[from.left, y], [side, y], [side, over]]
+        }
+        None => vec![[to.left - 10.0, over]],
+    };
+    strip.extend([[x, over], [x, to.top + 1.0]]);
+    strip
 }
 
 /// From the bottom of a tank into the one below, to its neighbour's side, or out.

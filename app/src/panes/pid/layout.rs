@@ -12,6 +12,8 @@ const TANK: Vec2 = vec2(1.2, 0.62);
 const RESERVOIR_HEIGHT: f32 = 0.5;
 /// How far above the tanks a pump's pipe runs.
 const HEAD_ROOM: f32 = 0.26;
+/// How far apart the pipes of several pumps run.
+const LANE: f32 = 0.14;
 
 /// A stream's way through the drawing.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,8 +54,10 @@ pub struct Layout {
     pub pumps: Vec<Pos2>,
     /// Suction pipes; empty for a pump from outside.
     pub suctions: Vec<Vec<Pos2>>,
-    /// Discharge pipes.
+    /// Discharge pipes into each pump's main tank.
     pub discharges: Vec<Route>,
+    /// Discharge pipes into the other tanks of a pump that splits its stream.
+    pub branches: Vec<Vec<Route>>,
     /// Sensors in the order of the network.
     pub sensors: Vec<Pos2>,
     /// Controller of each pump.
@@ -80,12 +84,20 @@ impl Layout {
         let spill_side = tanks.iter().map(|t| if t.center().x > middle { 1.0 } else { -1.0 }).collect();
         let (mut valves, valve_routes): (Vec<ValvePlace>, Vec<Route>) =
             network.valves.iter().map(|v| valve(v, &tanks)).unzip();
-        let (mut pumps, mut suctions, mut discharges) = (vec![], vec![], vec![]);
-        for pump in &network.pumps {
-            let (at, suction, discharge) = pump_route(pump, &tanks, all, top);
+        let drawing: Vec<usize> =
+            (0..network.pumps.len()).filter(|&i| network.pumps[i].from.is_some()).collect();
+        let (mut pumps, mut suctions, mut discharges, mut branches) = (vec![], vec![], vec![], vec![]);
+        for (i, pump) in network.pumps.iter().enumerate() {
+            let lane = drawing.iter().position(|&d| d == i).unwrap_or(0);
+            let on_the_left = drawing.len() > 1 && tanks[pump.to].center().x < middle;
+            let run = top - LANE * lane as f32;
+            let (at, suction) = pump_place(pump, &tanks, all, top, on_the_left);
+            let mut routes =
+                pump.outlets.iter().map(|&(tank, _)| delivery(at, pump.from.is_some(), tank, &tanks, run));
+            discharges.extend(routes.next());
+            branches.push(routes.collect());
             pumps.push(at);
             suctions.push(suction);
-            discharges.push(discharge);
         }
         let sensors: Vec<Pos2> = network
             .sensors
@@ -97,14 +109,23 @@ impl Layout {
             .iter()
             .zip(&pumps)
             .map(|(pump, at)| match pump.from {
-                Some(_) => pos2(at.x - 0.36, at.y - 1.0),
+                Some(_) => {
+                    let x = if at.x < all.left() { at.x + 0.36 } else { at.x - 0.36 };
+                    let free = |p: &Pos2| sensors.iter().all(|s| (*s - *p).length() > 0.35);
+                    let place = |up: f32| pos2(x, at.y - up);
+                    [1.0, 0.55, 1.5].map(place).into_iter().find(free).unwrap_or(place(1.0))
+                }
                 None => pos2(tanks[pump.to].right() + 0.36, tanks[pump.to].center().y - 0.48),
             })
             .collect();
         let mut bounds = all;
-        bounds.extend_with(pos2(all.left() - 0.16, top - 0.2));
+        let lanes = drawing.len().saturating_sub(1) as f32;
+        bounds.extend_with(pos2(all.left() - 0.16, top - LANE * lanes - 0.2));
         for point in pumps.iter().chain(&sensors) {
             bounds.extend_with(*point + vec2(0.28, 0.2));
+        }
+        for point in pumps.iter().filter(|at| at.x < all.left()) {
+            bounds.extend_with(*point - vec2(0.28, 0.2));
         }
         for place in valves.iter_mut().filter(|v| !v.vertical) {
             let above = |s: &Pos2| (s.x - place.at.x).abs() < 0.5 && (0.0..0.5).contains(&(place.at.y - s.y));
@@ -130,6 +151,7 @@ impl Layout {
             pumps,
             suctions,
             discharges,
+            branches,
             sensors,
             controllers,
         }
@@ -179,26 +201,49 @@ fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Rou
     )
 }
 
-fn pump_route(
+/// Where a pump stands, and its suction pipe.
+fn pump_place(
     pump: &vasos_engine::plant::Pump,
     tanks: &[Rect],
     all: Rect,
     top: f32,
-) -> (Pos2, Vec<Pos2>, Route) {
+    on_the_left: bool,
+) -> (Pos2, Vec<Pos2>) {
     let target = tanks[pump.to];
     let Some(from) = pump.from else {
-        // Off the middle, where the readings leave room.
-        let end = pos2(target.center().x + 0.22, target.top() - 0.06);
-        let at = pos2(target.left() + 0.06, top);
-        let pipe = vec![at, pos2(end.x, top), end];
-        return (at, vec![], Route { pipe, falls_into: Some(pump.to), to_outside: false });
+        let x = if is_covered(pump.to, tanks) { target.left() - 0.25 } else { target.left() + 0.06 };
+        return (pos2(x, top), vec![]);
     };
-    let end = pos2(target.center().x, target.top() - 0.06);
     let source = tanks[from];
-    let at = pos2(all.right() + 0.72, source.center().y);
-    let suction = vec![pos2(source.right(), at.y + 0.12), pos2(at.x, at.y + 0.12), at];
-    let pipe = vec![at, pos2(at.x, top), pos2(end.x, top), end];
-    (at, suction, Route { pipe, falls_into: Some(pump.to), to_outside: false })
+    let (x, mouth) =
+        if on_the_left { (all.left() - 0.72, source.left()) } else { (all.right() + 0.72, source.right()) };
+    let at = pos2(x, source.center().y);
+    (at, vec![pos2(mouth, at.y + 0.12), pos2(at.x, at.y + 0.12), at])
+}
+
+/// The pipe from a pump into a tank: over the top, or from the side where another tank stands above.
+fn delivery(at: Pos2, from_below: bool, tank: usize, tanks: &[Rect], run: f32) -> Route {
+    let target = tanks[tank];
+    let (x, y) = if is_covered(tank, tanks) {
+        let side = if at.x < target.center().x { target.left() + 0.14 } else { target.right() - 0.14 };
+        (side, target.top() - 0.12)
+    } else if from_below {
+        (target.center().x, run)
+    } else {
+        // Off the middle, where the readings leave room.
+        (target.center().x + 0.22, run)
+    };
+    let mut pipe = vec![at, pos2(at.x, y), pos2(x, y), pos2(x, target.top() - 0.06)];
+    if at.y == y {
+        pipe.remove(1);
+    }
+    Route { pipe, falls_into: Some(tank), to_outside: false }
+}
+
+/// Whether another tank stands above.
+fn is_covered(tank: usize, tanks: &[Rect]) -> bool {
+    let below = tanks[tank];
+    tanks.iter().any(|t| t.bottom() < below.top() && t.x_range().contains(below.center().x))
 }
 
 /// Maps grid units into a rectangle of the screen.
@@ -253,6 +298,24 @@ mod tests {
                 for point in layout.sensors.iter().chain(&layout.controllers).chain(&layout.pumps) {
                     assert!(!a.contains(*point), "{}: {point:?} is outside tank {i}", p.id);
                     assert!(layout.bounds.contains(*point), "{}: {point:?} is in the drawing", p.id);
+                }
+            }
+            let symbols: Vec<Pos2> =
+                layout.sensors.iter().chain(&layout.controllers).chain(&layout.pumps).copied().collect();
+            for (i, a) in symbols.iter().enumerate() {
+                for b in &symbols[i + 1..] {
+                    assert!((*a - *b).length() > 0.3, "{}: {a:?} and {b:?} are apart", p.id);
+                }
+            }
+            for (i, pump) in network.pumps.iter().enumerate() {
+                let routes: Vec<&Route> =
+                    std::iter::once(&layout.discharges[i]).chain(&layout.branches[i]).collect();
+                let ends: Vec<Option<usize>> = routes.iter().map(|r| r.falls_into).collect();
+                let outlets: Vec<Option<usize>> = pump.outlets.iter().map(|o| Some(o.0)).collect();
+                assert_eq!(ends, outlets, "{}: every outlet has its pipe", p.id);
+                for point in routes.iter().flat_map(|r| &r.pipe) {
+                    assert!(layout.bounds.contains(*point), "{}: {point:?} is in the drawing", p.id);
+                    assert!(layout.tanks.iter().all(|t| !t.contains(*point)), "{}: {point:?}", p.id);
                 }
             }
         }

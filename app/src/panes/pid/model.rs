@@ -1,6 +1,6 @@
 //! What the P&ID shows: the snapshot laid out, ready to paint and to test.
 
-use eframe::egui::{Pos2, Rect, pos2};
+use eframe::egui::{Pos2, Rect, pos2, vec2};
 use vasos_engine::plant::ReadingStatus;
 use vasos_engine::session::{Alarm, Snapshot};
 
@@ -91,8 +91,12 @@ pub struct PumpView {
     pub dry: bool,
     /// Water drawn in.
     pub suction: StreamView,
-    /// Water on its way to the tank.
+    /// Water on its way to the main tank.
     pub discharge: StreamView,
+    /// Water on its way to the other tanks of a pump that splits its stream.
+    pub branches: Vec<StreamView>,
+    /// All that arrives, in cm³/s.
+    pub arriving_cm3_s: f64,
     /// It can be set by hand: no loop in automatic writes it.
     pub by_hand: bool,
 }
@@ -161,6 +165,7 @@ impl PidModel {
         let pumps = (0..snapshot.pumps.len())
             .map(|i| {
                 let now = &snapshot.pumps[i];
+                let share = |outlet: usize| snapshot.network.pumps[i].outlets[outlet].1;
                 let suction = Route { pipe: layout.suctions[i].clone(), falls_into: None, to_outside: false };
                 let automatic = snapshot.loops.iter().any(|l| l.pump == i && l.mode.is_controlling());
                 PumpView {
@@ -170,7 +175,13 @@ impl PidModel {
                     unit: spec.pumps[i].unit.symbol(),
                     dry: now.dry,
                     suction: stream(&suction, now.pumped_cm3_s),
-                    discharge: stream(&layout.discharges[i], now.arriving_cm3_s),
+                    discharge: stream(&layout.discharges[i], share(0) * now.arriving_cm3_s),
+                    branches: layout.branches[i]
+                        .iter()
+                        .enumerate()
+                        .map(|(k, route)| stream(route, share(k + 1) * now.arriving_cm3_s))
+                        .collect(),
+                    arriving_cm3_s: now.arriving_cm3_s,
                     by_hand: !automatic,
                 }
             })
@@ -236,14 +247,20 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             tag: now.tag.clone(),
             at: frame.point(controller),
             abnormal: false,
-            mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some(),
+            mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some() && controller.x < pump.x,
             automatic: Some(now.mode.is_controlling()),
         });
         let down = snapshot.network.pumps[now.pump].from.is_some();
         let corner = if down { pos2(controller.x, pump.y - 0.06) } else { pos2(controller.x, pump.y - 0.14) };
         let end = pos2(pump.x, corner.y);
         let mut line = vec![sensor];
-        if sensor.x != controller.x && sensor.y != controller.y {
+        let across = Rect::from_two_pos(sensor, pos2(controller.x, sensor.y)).expand2(vec2(0.0, 0.01));
+        if layout.tanks.iter().any(|t| t.intersects(across)) {
+            // Under the tanks of that row instead of through them.
+            let row = layout.tanks.iter().filter(|t| t.y_range().contains(sensor.y)).map(Rect::bottom);
+            let y = row.fold(sensor.y, f32::max) + 0.06;
+            line.extend([pos2(sensor.x, y), pos2(controller.x, y)]);
+        } else if sensor.x != controller.x && sensor.y != controller.y {
             line.push(pos2(controller.x, sensor.y));
         }
         line.extend([controller, corner, end]);

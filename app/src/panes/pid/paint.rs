@@ -26,6 +26,9 @@ pub fn paint(painter: &Painter, model: &PidModel, p: &Palette, phase: &dyn Fn(us
     let pipe_width = (model.scale * 0.065).clamp(5.0, 10.0);
     for (i, pump) in model.pumps.iter().enumerate() {
         stream(painter, &pump.suction, pipe_width, p, phase(2 * i));
+        for branch in &pump.branches {
+            stream(painter, branch, pipe_width, p, phase(2 * i + 1));
+        }
         stream(painter, &pump.discharge, pipe_width, p, phase(2 * i + 1));
     }
     let offset = 2 * model.pumps.len();
@@ -45,7 +48,9 @@ pub fn paint(painter: &Painter, model: &PidModel, p: &Palette, phase: &dyn Fn(us
         falling(painter, &valve.stream, pipe_width, p, phase(offset + i));
     }
     for (i, pump) in model.pumps.iter().enumerate() {
-        falling(painter, &pump.discharge, pipe_width, p, phase(2 * i + 1));
+        for view in std::iter::once(&pump.discharge).chain(&pump.branches) {
+            falling(painter, view, pipe_width, p, phase(2 * i + 1));
+        }
     }
     for view in &model.bubbles {
         bubble(painter, view, bubble_radius(model.scale), p);
@@ -266,7 +271,7 @@ pub fn pump(painter: &Painter, view: &PumpView, scale: f32, hovered: bool, p: &P
     ];
     painter.add(Shape::convex_polygon(points, p.pane, Stroke::new(1.2, p.outline)));
     let input = format!("{} {}", text::fixed(view.input, 2), view.unit);
-    let flow = format!("{} cm³/s", text::fixed(view.discharge.flow_cm3_s, 1));
+    let flow = format!("{} cm³/s", text::fixed(view.arriving_cm3_s, 1));
     if view.suction.pipe.is_empty() {
         let at = view.at - vec2(0.0, r + 3.0);
         label(

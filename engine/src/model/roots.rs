@@ -13,7 +13,7 @@ const REAL_TOLERANCE: f64 = 1e-12;
 
 /// Value of a real polynomial at jω as (real, imaginary).
 #[inline]
-pub(super) fn at_j_omega(coefficients: &[f64], omega: f64) -> (f64, f64) {
+pub(crate) fn at_j_omega(coefficients: &[f64], omega: f64) -> (f64, f64) {
     let (mut re, mut im) = (0.0, 0.0);
     for &c in coefficients {
         (re, im) = (c - im * omega, re * omega);
@@ -22,7 +22,7 @@ pub(super) fn at_j_omega(coefficients: &[f64], omega: f64) -> (f64, f64) {
 }
 
 /// Product of two polynomials.
-pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; a.len() + b.len() - 1];
     for (i, x) in a.iter().enumerate() {
         for (j, y) in b.iter().enumerate() {
@@ -37,7 +37,7 @@ pub(super) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// Roots at the origin are exact; degrees one and two in closed form, above by Laguerre's method with deflation
 /// from the smallest root up (Press et al., Numerical Recipes, section 9.5), then refined together on the whole
 /// polynomial, because deflation by one of several equal roots spoils the others.
-pub(super) fn push_roots(coefficients: &[f64], out: &mut Vec<Complex64>) {
+pub(crate) fn push_roots(coefficients: &[f64], out: &mut Vec<Complex64>) {
     let significant = coefficients.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);
     let zeros_at_origin = coefficients.len() - significant;
     out.extend(std::iter::repeat_n(Complex64::new(0.0, 0.0), zeros_at_origin));
@@ -165,7 +165,7 @@ fn deflate(work: &mut Vec<f64>, factor: &[f64]) {
 ///
 /// Between neighbouring roots of the derivative a polynomial is monotone, so a change of sign there brackets one
 /// root; Newton's step is kept inside the bracket by geometric bisection.
-pub(super) fn push_positive_roots(coefficients: &[f64], out: &mut Vec<f64>) {
+pub(crate) fn push_positive_roots(coefficients: &[f64], out: &mut Vec<f64>) {
     let Some(first) = coefficients.iter().position(|&c| c != 0.0) else { return };
     let last = coefficients.iter().rposition(|&c| c != 0.0).unwrap_or(first);
     let c = &coefficients[first..=last];

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// States are scaled by powers of the poles' mean modulus, so that slow processes of high order keep their digits.
 #[derive(Debug, Clone)]
-pub(super) struct Realization {
+pub(crate) struct Realization {
     pub a: DMatrix<f64>,
     pub c: DVector<f64>,
     pub d: f64,
@@ -14,7 +14,7 @@ pub(super) struct Realization {
 
 /// Values and slopes of a signal at both ends of a step: the cubic between them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Hermite {
+pub(crate) struct Hermite {
     pub start: f64,
     pub end: f64,
     /// Slope at the start, per second.
@@ -25,11 +25,11 @@ pub(super) struct Hermite {
 
 impl Hermite {
     #[cfg(test)]
-    pub(super) fn constant(value: f64) -> Self {
+    pub(crate) fn constant(value: f64) -> Self {
         Self { start: value, end: value, start_slope: 0.0, end_slope: 0.0 }
     }
 
-    pub(super) fn plus(self, value: f64) -> Self {
+    pub(crate) fn plus(self, value: f64) -> Self {
         Self { start: self.start + value, end: self.end + value, ..self }
     }
 
@@ -41,14 +41,14 @@ impl Hermite {
     }
 
     /// Integral over a step of h seconds.
-    pub(super) fn integral(self, h: f64) -> f64 {
+    pub(crate) fn integral(self, h: f64) -> f64 {
         0.5 * h * (self.start + self.end) + h * h / 12.0 * (self.start_slope - self.end_slope)
     }
 }
 
 impl Realization {
     /// From numerator and denominator in falling powers of s, no more zeros than poles.
-    pub(super) fn new(num: &[f64], den: &[f64]) -> Self {
+    pub(crate) fn new(num: &[f64], den: &[f64]) -> Self {
         let order = den.len() - 1;
         let leading = den[0];
         let padded = |i: usize| {
@@ -73,16 +73,16 @@ impl Realization {
         Self { a, c, d }
     }
 
-    pub(super) fn order(&self) -> usize {
+    pub(crate) fn order(&self) -> usize {
         self.c.len()
     }
 
-    pub(super) fn output(&self, x: &DVector<f64>, v: f64) -> f64 {
+    pub(crate) fn output(&self, x: &DVector<f64>, v: f64) -> f64 {
         self.c.dot(x) + self.d * v
     }
 
     /// ẏ, with v̇ given.
-    pub(super) fn output_slope(&self, x: &DVector<f64>, v: f64, v_slope: f64) -> f64 {
+    pub(crate) fn output_slope(&self, x: &DVector<f64>, v: f64, v_slope: f64) -> f64 {
         let mut slope = self.d * v_slope;
         for i in 0..self.order() {
             let row: f64 = (0..self.order()).map(|j| self.a[(i, j)] * x[j]).sum();
@@ -95,7 +95,7 @@ impl Realization {
 
 /// The exact map of a state over one step: x⁺ = Φ x + Σ Γₖ v⁽ᵏ⁾ for an input cubic in time.
 #[derive(Debug, Clone)]
-pub(super) struct Step {
+pub(crate) struct Step {
     phi: DMatrix<f64>,
     gamma: DMatrix<f64>,
     h: f64,
@@ -104,7 +104,7 @@ pub(super) struct Step {
 
 impl Step {
     /// For `ẋ = A x + (0, …, 0, gain)ᵀ v` over h seconds, by the exponential of the matrix that also holds the input.
-    pub(super) fn new(a: &DMatrix<f64>, gain: f64, h: f64) -> Self {
+    pub(crate) fn new(a: &DMatrix<f64>, gain: f64, h: f64) -> Self {
         let n = a.nrows();
         let mut joined = DMatrix::zeros(n + 4, n + 4);
         joined.view_mut((0, 0), (n, n)).copy_from(&(a * h));
@@ -124,7 +124,7 @@ impl Step {
     }
 
     /// Moves the state on by one step; allocates nothing.
-    pub(super) fn advance(&mut self, x: &mut DVector<f64>, input: Hermite) {
+    pub(crate) fn advance(&mut self, x: &mut DVector<f64>, input: Hermite) {
         let v = input.derivatives(self.h);
         let n = x.len();
         for i in 0..n {
