@@ -69,6 +69,9 @@ pub(crate) struct Motion<const N: usize, V> {
     pub span_pumped: [V; N],
     pub span_arriving: [V; N],
     pub span_spills: [V; N],
+    /// Tanks that a careful step leaves empty, and the equations of their outflows: scratch of [`super::rims`].
+    pub(super) emptied: Vec<usize>,
+    pub(super) system: Vec<f64>,
     /// Steps taken.
     pub steps: u64,
 }
@@ -133,6 +136,8 @@ impl<const N: usize, V: Number> Motion<N, V> {
             span_pumped: zero,
             span_arriving: zero,
             span_spills: zero,
+            emptied: vec![],
+            system: vec![],
             steps: 0,
         };
         made.restart();
@@ -208,7 +213,8 @@ impl<const N: usize, V: Number> Motion<N, V> {
         self.count_span(1.0);
         let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(longest_s, f64::min);
         let most_s = if self.look_ahead { change_s } else { change_s.min(left_s) };
-        let step_s = self.prepare_step(most_s);
+        self.prepare_step();
+        let step_s = self.length_for(most_s, MOST_PIECES);
         self.runge_kutta::<false>(step_s);
         let inside = self
             .end
@@ -235,18 +241,17 @@ impl<const N: usize, V: Number> Motion<N, V> {
         true
     }
 
-    /// Starts a step of at most `most_s` at the present end; gives its length.
-    pub(super) fn prepare_step(&mut self, most_s: f64) -> f64 {
+    /// Starts a step at the present end.
+    pub(super) fn prepare_step(&mut self) {
         self.set_inflow();
         (self.start, self.start_flow) = (self.end, self.end_flow);
         self.start_slope = std::array::from_fn(|i| self.end_net[i] + self.inflow[i]);
-        self.length_for(most_s)
     }
 
     /// Length of a step of at most `most_s` that resolves every stream from `start`.
-    pub(super) fn length_for(&self, most_s: f64) -> f64 {
+    pub(super) fn length_for(&self, most_s: f64, most_pieces: f64) -> f64 {
         let pieces = self.streams.pieces(&self.start, &self.start_slope, most_s, STEP_RATE, STEP_CURVATURE);
-        if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(MOST_PIECES) } else { most_s }
+        if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(most_pieces) } else { most_s }
     }
 
     /// What pumps bring each node from now to the next change in the air.

@@ -4,16 +4,17 @@
 use super::motion::{Motion, NO_TIME_S};
 use super::network::Network;
 use super::pipe::Pipe;
-use super::streams::Streams;
 
 /// Longest step near a rim or an empty tank, in seconds.
 const CAREFUL_STEP_S: f64 = 0.1;
-/// Share of a tank by which rounding may leave it below empty.
-const EMPTY_SHARE: f64 = 1e-12;
+
+/// Most pieces such a step is cut into: what empties does so in a moment anyway.
+const CAREFUL_PIECES: f64 = 8.0;
 
 /// Volumes of a step in cm³ while they are mended.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Volumes<const N: usize> {
+    streams: [f64; N],
     pumped: [f64; N],
     arriving: [f64; N],
     spilled: [f64; N],
@@ -34,15 +35,12 @@ impl<const N: usize> Motion<N, f64> {
     }
 
     fn careful_step(&mut self, network: &Network, most_s: f64, fed: bool, dry: &mut [bool]) -> f64 {
-        let mut step_s = self.prepare_step(most_s.min(CAREFUL_STEP_S));
+        self.prepare_step();
+        // A tank held at its rim does not hurry.
         let (start, mut slope) = (self.start, self.start_slope);
         self.hold_at_rims(&start, &mut slope);
-        if slope != self.start_slope {
-            // A tank held at its rim does not hurry.
-            self.start_slope = slope;
-            let most_s = most_s.min(CAREFUL_STEP_S);
-            step_s = self.length_for(most_s);
-        }
+        self.start_slope = slope;
+        let step_s = self.length_for(most_s.min(CAREFUL_STEP_S), CAREFUL_PIECES);
         self.runge_kutta::<true>(step_s);
         self.mend(network, step_s, fed, dry);
         self.evaluate_end();
@@ -53,44 +51,165 @@ impl<const N: usize> Motion<N, f64> {
 
     /// Moves the volumes of a step from start to end, mended until every tank can hold and give them.
     fn mend(&mut self, network: &Network, step_s: f64, fed: bool, dry: &mut [bool]) {
-        let mut volumes =
-            Volumes { pumped: [0.0; N], arriving: [0.0; N], spilled: [0.0; N], after: [0.0; N] };
+        let mut wanted = Volumes {
+            streams: self.volume,
+            pumped: [0.0; N],
+            arriving: [0.0; N],
+            spilled: [0.0; N],
+            after: [0.0; N],
+        };
         for i in 0..network.pumps.len() {
-            volumes.pumped[i] = if fed { 0.0 } else { step_s * self.commanded[i] };
-            volumes.arriving[i] = step_s * self.arriving[i];
+            wanted.pumped[i] = if fed { 0.0 } else { step_s * self.commanded[i] };
+            wanted.arriving[i] = step_s * self.arriving[i];
         }
-        for _ in 0..=2 * network.tanks.len() {
-            self.sum(network, &mut volumes);
-            let mut mended = false;
-            for (i, tank) in network.tanks.iter().enumerate() {
-                let (most, volume) = (tank.height_cm * tank.area_cm2, volumes.after[i]);
-                if volume < -EMPTY_SHARE * most {
-                    self.scale_outflows(network, &mut volumes, i, dry);
-                    mended = true;
-                    break;
-                }
-                if volume > most * (1.0 + 1e-15) {
-                    volumes.spilled[i] += volume - most;
-                    mended = true;
-                    break;
-                }
-            }
-            if !mended {
-                break;
-            }
-        }
+        let mut volumes = wanted.clone();
+        self.sum(network, &mut volumes);
+        self.empty(network, &wanted, &mut volumes, dry);
+        self.spill(network, &mut volumes);
         self.book(network, &volumes, step_s, fed);
     }
 
-    fn sum(&self, network: &Network, volumes: &mut Volumes<N>) {
+    /// Shrinks everything that leaves tanks which have less than that, so that they end the step empty.
+    ///
+    /// What one tank gives less, the next may not give either, round the whole circuit: with the shares x of the
+    /// empty tanks' outflows, `out_i x_i − Σ_j (from j to i) x_j = held_i`, a small linear system.
+    fn empty(&mut self, network: &Network, wanted: &Volumes<N>, volumes: &mut Volumes<N>, dry: &mut [bool]) {
+        self.emptied.clear();
+        loop {
+            let before = self.emptied.len();
+            for i in 0..network.tanks.len() {
+                if volumes.after[i] < 0.0 && !self.emptied.contains(&i) {
+                    self.emptied.push(i);
+                }
+            }
+            if self.emptied.len() == before {
+                return;
+            }
+            let mut share = [1.0; N];
+            for &tank in &self.emptied {
+                share[tank] = 0.0;
+            }
+            self.scale(wanted, volumes, &share);
+            self.sum(network, volumes);
+            self.build_system(wanted, volumes);
+            self.solve_system(&mut share);
+            self.scale(wanted, volumes, &share);
+            self.sum(network, volumes);
+            for (dry, (feed, &flow)) in dry.iter_mut().zip(self.feeds.iter().zip(&self.commanded)) {
+                *dry |= flow > 0.0 && self.emptied.contains(&feed.source);
+            }
+        }
+    }
+
+    /// The tank a stream's volume leaves.
+    fn left_by(&self, stream: usize, volume: f64) -> (usize, usize) {
+        let (from, to) = self.streams.ends(stream);
+        if volume >= 0.0 { (from, to) } else { (to, from) }
+    }
+
+    /// Volumes of which only a share leaves each tank.
+    fn scale(&self, wanted: &Volumes<N>, volumes: &mut Volumes<N>, share: &[f64; N]) {
+        for i in 0..self.streams.len() {
+            volumes.streams[i] = wanted.streams[i] * share[self.left_by(i, wanted.streams[i]).0];
+        }
+        for (i, feed) in self.feeds.iter().enumerate() {
+            volumes.pumped[i] = wanted.pumped[i] * share[feed.source];
+            if self.pipes[i].arriving_cm3_s().is_none() {
+                volumes.arriving[i] = wanted.arriving[i] * share[feed.source];
+            }
+        }
+    }
+
+    /// Rows of the system for the emptied tanks; `volumes` hold what comes to them when they give nothing.
+    fn build_system(&mut self, wanted: &Volumes<N>, volumes: &Volumes<N>) {
+        let n = self.emptied.len();
+        let mut system = std::mem::take(&mut self.system);
+        system.clear();
+        system.resize(n * (n + 1), 0.0);
+        let row = |tank: usize| self.emptied.iter().position(|&t| t == tank);
+        let mut add = |from: usize, to: usize, volume: f64| {
+            if let (Some(column), Some(row)) = (row(from), row(to)) {
+                system[row * (n + 1) + column] -= volume;
+            }
+        };
+        for i in 0..self.streams.len() {
+            let (from, to) = self.left_by(i, wanted.streams[i]);
+            add(from, to, wanted.streams[i].abs());
+            add(from, from, -wanted.streams[i].abs());
+        }
+        for (i, feed) in self.feeds.iter().enumerate() {
+            add(feed.source, feed.source, -wanted.pumped[i]);
+            if self.pipes[i].arriving_cm3_s().is_none() {
+                for &(to, part) in &feed.outlets {
+                    add(feed.source, to, part * wanted.arriving[i]);
+                }
+            }
+        }
+        for (row, &tank) in self.emptied.iter().enumerate() {
+            system[row * (n + 1) + n] = volumes.after[tank].max(0.0);
+        }
+        self.system = system;
+    }
+
+    /// Gaussian elimination; columns dominate, so no pivoting. A circuit that keeps all its water gives none.
+    fn solve_system(&mut self, share: &mut [f64; N]) {
+        let (n, a) = (self.emptied.len(), &mut self.system);
+        let width = n + 1;
+        let largest = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for p in 0..n {
+            let pivot = a[p * width + p];
+            if pivot <= 1e-14 * largest {
+                continue;
+            }
+            for r in p + 1..n {
+                let factor = a[r * width + p] / pivot;
+                if factor != 0.0 {
+                    for c in p..width {
+                        a[r * width + c] -= factor * a[p * width + c];
+                    }
+                }
+            }
+        }
+        for p in (0..n).rev() {
+            let pivot = a[p * width + p];
+            let known: f64 = (p + 1..n).map(|c| a[p * width + c] * share[self.emptied[c]]).sum();
+            let x = if pivot <= 1e-14 * largest { 0.0 } else { (a[p * width + n] - known) / pivot };
+            share[self.emptied[p]] = x.clamp(0.0, 1.0);
+        }
+    }
+
+    /// Lets what no rim holds run over, from tank to tank.
+    fn spill(&self, network: &Network, volumes: &mut Volumes<N>) {
         let outside = self.streams.outside();
+        for _ in 0..=network.tanks.len() {
+            let mut spills = false;
+            for (i, tank) in network.tanks.iter().enumerate() {
+                let excess = volumes.after[i] - tank.height_cm * tank.area_cm2;
+                if excess > 1e-15 * tank.height_cm * tank.area_cm2 {
+                    volumes.spilled[i] += excess;
+                    volumes.after[i] -= excess;
+                    volumes.after[tank.spills_to.unwrap_or(outside)] += excess;
+                    spills = true;
+                }
+            }
+            if !spills {
+                return;
+            }
+        }
+        // Tanks that spill into each other round and round: what is left goes outside.
+        for (i, tank) in network.tanks.iter().enumerate() {
+            let excess = (volumes.after[i] - tank.height_cm * tank.area_cm2).max(0.0);
+            volumes.spilled[i] += excess;
+            volumes.after[i] -= excess;
+            volumes.after[outside] += excess;
+        }
+    }
+
+    /// What every node holds after the step.
+    fn sum(&self, network: &Network, volumes: &mut Volumes<N>) {
         volumes.after = self.start;
         for (i, tank) in network.tanks.iter().enumerate() {
             volumes.after[i] *= tank.area_cm2;
-        }
-        for (i, tank) in network.tanks.iter().enumerate() {
-            volumes.after[i] -= volumes.spilled[i];
-            volumes.after[tank.spills_to.unwrap_or(outside)] += volumes.spilled[i];
         }
         for (i, feed) in self.feeds.iter().enumerate() {
             volumes.after[feed.source] -= volumes.pumped[i];
@@ -100,43 +219,8 @@ impl<const N: usize> Motion<N, f64> {
         }
         for i in 0..self.streams.len() {
             let (from, to) = self.streams.ends(i);
-            volumes.after[from] -= self.volume[i];
-            volumes.after[to] += self.volume[i];
-        }
-    }
-
-    /// Shrinks everything that leaves an over-drawn tank so that it ends the step empty.
-    fn scale_outflows(&mut self, network: &Network, volumes: &mut Volumes<N>, tank: usize, dry: &mut [bool]) {
-        let leaves = |streams: &Streams<N, f64>, i: usize, volume: f64| {
-            let (from, to) = streams.ends(i);
-            (from == tank && volume > 0.0) || (to == tank && volume < 0.0)
-        };
-        let mut out = volumes.spilled[tank];
-        for (i, pump) in network.pumps.iter().enumerate() {
-            if pump.from == Some(tank) {
-                out += volumes.pumped[i];
-            }
-        }
-        for i in 0..self.streams.len() {
-            if leaves(&self.streams, i, self.volume[i]) {
-                out += self.volume[i].abs();
-            }
-        }
-        let keep = ((out + volumes.after[tank]) / out).max(0.0);
-        volumes.spilled[tank] *= keep;
-        for (i, pump) in network.pumps.iter().enumerate() {
-            if pump.from == Some(tank) && self.commanded[i] > 0.0 {
-                volumes.pumped[i] *= keep;
-                dry[i] = true;
-                if self.pipes[i].arriving_cm3_s().is_none() {
-                    volumes.arriving[i] *= keep;
-                }
-            }
-        }
-        for i in 0..self.streams.len() {
-            if leaves(&self.streams, i, self.volume[i]) {
-                self.volume[i] *= keep;
-            }
+            volumes.after[from] -= volumes.streams[i];
+            volumes.after[to] += volumes.streams[i];
         }
     }
 
@@ -156,7 +240,7 @@ impl<const N: usize> Motion<N, f64> {
             self.span_arriving[i] += volumes.arriving[i];
         }
         for i in 0..N {
-            self.span_volume[i] += self.volume[i];
+            self.span_volume[i] += volumes.streams[i];
             self.span_spills[i] += volumes.spilled[i];
         }
     }
