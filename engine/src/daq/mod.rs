@@ -4,4 +4,5 @@ mod simulated;
 mod source;
 
 pub use simulated::SimulatedRig;
+pub(crate) use simulated::{MISHAPS, convert};
 pub use source::{RigControls, Source};

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::plant::spec::ConverterSpec;
+
 use super::source::{RigControls, Source};
 use crate::plant::{
-    ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Plant, Reading, RigError, Transmitter,
-    check_fault, nearest,
+    ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Plant, Pump, Reading, RigError,
+    Transmitter, check_fault, nearest,
 };
 
 /// A plant with its transmitters, converters and a seeded source of noise.
@@ -26,7 +28,7 @@ pub struct SimulatedRig {
 }
 
 /// Tells the source of spikes from that of noise.
-const MISHAPS: u64 = 0x5b1c_e5;
+pub(crate) const MISHAPS: u64 = 0x5b1c_e5;
 
 impl SimulatedRig {
     /// A rig at the state of its file.
@@ -40,7 +42,7 @@ impl SimulatedRig {
             .iter()
             .map(|s| Transmitter::new(&s.spec, converters, network.spec.sample_time_s))
             .collect();
-        let dac_step = converters.map(|c| c.dac_full_scale_v / f64::from(c.dac_bits).exp2());
+        let dac_step = converters.map(ConverterSpec::dac_step_v);
         let plant = Plant::new(network)?;
         Ok(Self {
             written: plant.inputs().to_vec(),
@@ -74,6 +76,15 @@ impl SimulatedRig {
     }
 }
 
+/// An output within its rate and range, and as the converter of that step gives it to the pump.
+#[inline]
+pub(crate) fn convert(pump: &Pump, sample_time_s: f64, step: Option<f64>, last: f64, mv: f64) -> (f64, f64) {
+    let most = pump.rate_limit_per_s * sample_time_s;
+    let limited =
+        if mv.is_finite() { mv.clamp(last - most, last + most).clamp(pump.min, pump.max) } else { mv };
+    (limited, step.map_or(limited, |step| nearest(limited / step) * step))
+}
+
 impl Source for SimulatedRig {
     fn network(&self) -> &Arc<Network> {
         self.plant.network()
@@ -93,15 +104,10 @@ impl Source for SimulatedRig {
     }
 
     fn write(&mut self, pump: usize, mv: f64) -> Result<f64, RigError> {
-        let p = &self.plant.network().pumps[pump];
-        let most = p.rate_limit_per_s * self.plant.network().spec.sample_time_s;
-        let last = self.written[pump];
-        let limited =
-            if mv.is_finite() { mv.clamp(last - most, last + most).clamp(p.min, p.max) } else { mv };
-        let converted = match self.dac_step {
-            Some(step) if self.measurement.quantisation => nearest(limited / step) * step,
-            _ => limited,
-        };
+        let network = self.plant.network();
+        let step = self.dac_step.filter(|_| self.measurement.quantisation);
+        let (limited, converted) =
+            convert(&network.pumps[pump], network.spec.sample_time_s, step, self.written[pump], mv);
         self.plant.set_input(pump, converted)?;
         self.written[pump] = limited;
         Ok(limited)

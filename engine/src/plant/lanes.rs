@@ -21,8 +21,14 @@ pub(crate) trait Number:
     + AddAssign
     + SubAssign
 {
+    /// How many plants.
+    const PLANTS: usize;
     /// The same in every plant.
     fn of(x: f64) -> Self;
+    /// A number for each plant.
+    fn each_of(number: impl FnMut(usize) -> f64) -> Self;
+    /// The number of one plant.
+    fn of_plant(&self, plant: usize) -> f64;
     /// Square root.
     fn sqrt(self) -> Self;
     /// The larger of both, plant by plant.
@@ -34,6 +40,18 @@ pub(crate) trait Number:
 }
 
 impl Number for f64 {
+    const PLANTS: usize = 1;
+
+    #[inline(always)]
+    fn each_of(mut number: impl FnMut(usize) -> f64) -> Self {
+        number(0)
+    }
+
+    #[inline(always)]
+    fn of_plant(&self, _plant: usize) -> f64 {
+        *self
+    }
+
     #[inline(always)]
     fn of(x: f64) -> Self {
         x
@@ -135,6 +153,18 @@ impl<const L: usize> SubAssign for Pack<L> {
 }
 
 impl<const L: usize> Number for Pack<L> {
+    const PLANTS: usize = L;
+
+    #[inline(always)]
+    fn each_of(number: impl FnMut(usize) -> f64) -> Self {
+        Self(std::array::from_fn(number))
+    }
+
+    #[inline(always)]
+    fn of_plant(&self, plant: usize) -> f64 {
+        self.0[plant]
+    }
+
     #[inline(always)]
     fn of(x: f64) -> Self {
         Self([x; L])

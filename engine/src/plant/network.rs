@@ -58,7 +58,7 @@ impl Pump {
 
     /// As [`Self::flow_cm3_s`], looking first at the piece of the curve where the last input lay.
     #[inline]
-    pub(super) fn flow_near(&self, input: f64, piece: &mut usize) -> f64 {
+    pub(crate) fn flow_near(&self, input: f64, piece: &mut usize) -> f64 {
         if let Some([[x0, q0], [x1, q1]]) = self.curve.get(*piece..*piece + 2)
             && *x0 <= input
             && input < *x1

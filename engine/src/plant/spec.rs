@@ -247,6 +247,14 @@ pub struct ConverterSpec {
     pub dac_full_scale_v: f64,
 }
 
+impl ConverterSpec {
+    /// Step of the output converter in V.
+    #[must_use]
+    pub fn dac_step_v(&self) -> f64 {
+        self.dac_full_scale_v / f64::from(self.dac_bits).exp2()
+    }
+}
+
 /// A named state of the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

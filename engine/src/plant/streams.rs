@@ -200,14 +200,15 @@ impl<const N: usize, V: Number> Streams<N, V> {
     /// Adds what a stream's flow, or volume, brings every node.
     #[inline(always)]
     fn add(&self, stream: &Stream<V>, column: &[V; N], flow: V, nodes: &mut [V; N]) {
-        if N <= SHORT {
+        if N <= SHORT && V::PLANTS == 1 {
             for (node, &share) in nodes.iter_mut().zip(column) {
                 *node += share * flow;
             }
         } else {
-            nodes[stream.from] += column[stream.from] * flow;
-            if stream.to != stream.from {
-                nodes[stream.to] += column[stream.to] * flow;
+            let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
+            nodes[from] += column[from] * flow;
+            if to != from {
+                nodes[to] += column[to] * flow;
             }
         }
     }

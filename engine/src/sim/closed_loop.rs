@@ -51,6 +51,25 @@ impl ClosedLoop {
         Ok(closed)
     }
 
+    /// Another rig of the same structure in the same state: configuration, levels and inputs.
+    ///
+    /// # Errors
+    /// [`CommandError`] when the state does not fit that rig.
+    pub(super) fn resembling(
+        other: &Self,
+        network: Arc<Network>,
+        measurement: Measurement,
+        seed: u64,
+    ) -> Result<Self, CommandError> {
+        let mut rig = SimulatedRig::new(network, measurement, seed)?;
+        rig.configure(other.configuration)?;
+        let mut closed = Self::new(Box::new(rig), other.configuration);
+        if let Some(plant) = other.source.plant() {
+            closed.restart_at(plant.levels_cm(), plant.inputs())?;
+        }
+        Ok(closed)
+    }
+
     /// A source in a configuration of its network.
     #[must_use]
     pub fn new(source: Box<dyn Source>, configuration: usize) -> Self {

@@ -3,6 +3,8 @@
 mod active_loop;
 mod closed_loop;
 mod compare;
+mod ensemble;
+mod flock;
 mod real_rig;
 mod scenario;
 mod start;
@@ -10,6 +12,7 @@ mod start;
 pub use active_loop::{ActiveLoop, LoopTarget};
 pub use closed_loop::ClosedLoop;
 pub use compare::{CompareError, Comparison, InputSeries, ModelKind, ModelTrace, agreement};
+pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, run_ensemble, vary};
 pub use real_rig::{LevelResistance, record_real_rig};
 pub use scenario::{Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario};
 pub use start::{StartError, check_starts};

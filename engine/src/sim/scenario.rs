@@ -150,11 +150,18 @@ impl Explain for ScenarioError {
 /// Longest run in samples.
 const MOST_SAMPLES: f64 = 1e8;
 
-/// Runs a scenario on a rig from start to end.
-///
-/// # Errors
-/// [`ScenarioError`] naming the time of the refused command, or the length that is not possible.
-pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, ScenarioError> {
+/// A scenario ready to run.
+pub(super) struct Prepared {
+    /// In its starting state.
+    pub closed: ClosedLoop,
+    /// Commands in the order of their times.
+    pub events: Vec<ScenarioEvent>,
+    /// Samples of the run.
+    pub samples: u64,
+}
+
+/// Checks a scenario and puts a rig into its starting state.
+pub(super) fn prepare(network: &Arc<Network>, scenario: &Scenario) -> Result<Prepared, ScenarioError> {
     let (duration_s, sample_time_s) = (scenario.duration_s, network.spec.sample_time_s);
     if duration_s.is_nan() || duration_s < 0.0 {
         return Err(ScenarioError::Length { duration_s });
@@ -163,30 +170,59 @@ pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, S
     if count > MOST_SAMPLES {
         return Err(ScenarioError::Duration { duration_s, sample_time_s });
     }
-    let at = |at_s: f64| move |error: CommandError| ScenarioError::Command { at_s, error };
-    let configuration = configuration_index(&network, scenario).map_err(at(0.0))?;
-    let mut closed = ClosedLoop::simulated(network, configuration, scenario.measurement, scenario.seed)
-        .map_err(at(0.0))?;
-    set_start(&mut closed, &scenario.start).map_err(at(0.0))?;
-    let mut events: Vec<&ScenarioEvent> = scenario.events.iter().collect();
+    if let Some(event) = scenario.events.iter().find(|e| e.at_s.is_nan()) {
+        let (item, expected) = ("event".to_owned(), "a time in seconds".to_owned());
+        let error = RigError::Value { item, field: "at_s", value: event.at_s, expected };
+        return Err(ScenarioError::Command { at_s: event.at_s, error: error.into() });
+    }
+    let at_start = |error: CommandError| ScenarioError::Command { at_s: 0.0, error };
+    let configuration = configuration_index(network, scenario).map_err(at_start)?;
+    let mut closed =
+        ClosedLoop::simulated(network.clone(), configuration, scenario.measurement, scenario.seed)
+            .map_err(at_start)?;
+    set_start(&mut closed, &scenario.start).map_err(at_start)?;
+    let mut events = scenario.events.clone();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    let mut pending = events.into_iter().peekable();
+    Ok(Prepared { closed, events, samples: count as u64 + 1 })
+}
+
+/// Runs a scenario on a rig from start to end.
+///
+/// # Errors
+/// [`ScenarioError`] naming the time of the refused command, or the length that is not possible.
+pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, ScenarioError> {
+    let Prepared { mut closed, events, samples } = prepare(&network, scenario)?;
     let keep = u64::from(scenario.keep_every.max(1));
     let mut time_s = Vec::new();
     let mut values = Vec::new();
-    for sample in 0..=(count as u64) {
-        let now_s = closed.time_s();
-        while let Some(event) = pending.next_if(|e| e.at_s <= now_s + 1e-9) {
-            closed.apply(&event.command).map_err(at(event.at_s))?;
-        }
-        let row = closed.step();
+    run_samples(&mut closed, &events, samples, |sample, now_s, row| {
         if sample % keep == 0 {
             time_s.push(now_s);
             values.extend_from_slice(row);
         }
-    }
+    })?;
     let integrator_steps = closed.source().plant().map_or(0, crate::plant::Plant::steps);
     Ok(Run { channels: closed.channels().clone(), time_s, values, integrator_steps })
+}
+
+/// Takes samples, each preceded by the commands that are due, and shows every row with its number and time.
+pub(super) fn run_samples(
+    closed: &mut ClosedLoop,
+    events: &[ScenarioEvent],
+    samples: u64,
+    mut see: impl FnMut(u64, f64, &[f64]),
+) -> Result<(), ScenarioError> {
+    let mut pending = events.iter().peekable();
+    for sample in 0..samples {
+        let now_s = closed.time_s();
+        while let Some(event) = pending.next_if(|e| e.at_s <= now_s + 1e-9) {
+            closed
+                .apply(&event.command)
+                .map_err(|error| ScenarioError::Command { at_s: event.at_s, error })?;
+        }
+        see(sample, now_s, closed.step());
+    }
+    Ok(())
 }
 
 fn configuration_index(network: &Network, scenario: &Scenario) -> Result<usize, CommandError> {
