@@ -87,7 +87,7 @@ fn a_cascade_starts_at_rest_and_follows_its_outer_setpoint() {
     assert!((closed.loops()[0].control.mv() - mv).abs() < 1e-4, "it rests");
     assert!((closed.loops()[0].control.setpoint_cm - start).abs() < 1e-4);
     apply(&mut closed, RigCommand::Setpoint { tag: "LIC-03".to_owned(), level_cm: 3.0 });
-    for _ in 0..6000 {
+    for _ in 0..20_000 {
         closed.step();
     }
     assert!((level(&closed, 2) - 3.0).abs() < 1e-3, "{}", level(&closed, 2));
