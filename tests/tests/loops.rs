@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use vasos_engine::analyze::Excitation;
 use vasos_engine::control::{Action, Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning};
 use vasos_engine::document::{Consequence, Document, DocumentCommand, History, rig_commands};
 use vasos_engine::plant::{Measurement, Network, RigError};
 use vasos_engine::session::{CommandError, RigCommand};
-use vasos_engine::sim::{ClosedLoop, LoopTarget};
+use vasos_engine::sim::{ClosedLoop, LoopTarget, Scenario, run_scenario};
 use vasos_io::rig::{FileError, parse_rig, preset};
 
 /// SimTank with three tanks and other loops.
@@ -291,4 +292,22 @@ fn law_and_options_are_undone_and_reach_a_reloaded_rig() {
     let [inner, outer] = running.loops() else { panic!("two loops") };
     assert_eq!((inner.control.mode, outer.control.law().id()), (Mode::Cascade, "pid_i2gl"));
     assert_eq!(outer.control.options(), &LoopOptions::default());
+}
+
+/// The outer loop's figures begin at its setpoint step; the inner loop's setpoint moves all the time.
+#[test]
+fn figures_begin_at_the_last_setpoint_step() {
+    let network = rig(CASCADE).expect("a rig");
+    let text = "schema = 1\nrig = \"x\"\nduration_s = 3000.0\nmeasurement = { noise = false, quantisation = false, \
+                resolution = false }\n[[event]]\nat_s = 100.0\nsetpoint = { tag = \"LIC-03\", level_cm = 3.0 }\n";
+    let scenario: Scenario = toml::from_str(text).expect("a scenario");
+    let figures = run_scenario(network, &scenario).expect("runs").figures();
+    let [inner, outer] = &figures[..] else { panic!("two loops: {figures:?}") };
+    assert_eq!((inner.excitation, inner.from_s), (Excitation::Load, 0.0));
+    assert_eq!((outer.excitation, outer.from_s), (Excitation::Setpoint, 100.0));
+    let metrics = outer.metrics.as_ref().expect("figures");
+    assert!((metrics.final_value - 3.0).abs() < 0.05 && metrics.rise_time_s.is_some(), "{metrics:?}");
+    // PID-I2GL, slow and far from its limits: ∫ e dt = Ti/Kc·Δu.
+    let integral = 120.0 / 2.0 * (metrics.max_u - metrics.min_u);
+    assert!(metrics.ie > 0.0 && metrics.ie < 1.5 * integral, "{} {integral}", metrics.ie);
 }
