@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use vasos_engine::analyze::Excitation;
-use vasos_engine::control::{Action, Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning};
+use vasos_engine::control::{Action, Clip, Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning, Sends};
 use vasos_engine::document::{Consequence, Document, DocumentCommand, History, rig_commands};
 use vasos_engine::plant::{Measurement, Network, RigError};
 use vasos_engine::session::{CommandError, RigCommand};
@@ -310,4 +310,32 @@ fn figures_begin_at_the_last_setpoint_step() {
     // PID-I2GL, slow and far from its limits: ∫ e dt = Ti/Kc·Δu.
     let integral = 120.0 / 2.0 * (metrics.max_u - metrics.min_u);
     assert!(metrics.ie > 0.0 && metrics.ie < 1.5 * integral, "{} {integral}", metrics.ie);
+}
+
+/// Spec control.md: unfiltered, the paper's AMIGO 7/15/1 has its MV at a limit most of the time; increments that
+/// the limiter cuts are lost to one side and the level sinks. Clipping the integral alone keeps it.
+#[test]
+fn val_noise_at_the_limits_lets_the_level_sink_unless_the_integral_alone_is_clipped() {
+    let mean = |clip| {
+        let network = preset("stad").expect("preset");
+        let mut closed = ClosedLoop::simulated(network, 0, Measurement::DEFAULT, 7).expect("starts");
+        let tag = || "LIC-02".to_owned();
+        let tuning = PidTuning::new(PidGains::pid(7.0, 15.0, 1.0));
+        apply(&mut closed, RigCommand::Tuning { tag: tag(), tuning });
+        let law = Law::PidI2gl { clip, sends: Sends::Position };
+        apply(&mut closed, RigCommand::Law { tag: tag(), law });
+        let (mut sum, mut at_limit) = (0.0, 0);
+        for k in 0..9000 {
+            closed.step();
+            if k >= 4500 {
+                sum += level(&closed, 1) / 4500.0;
+                at_limit += usize::from(closed.loops()[0].control.at_limit().is_some());
+            }
+        }
+        (sum, at_limit as f64 / 4500.0)
+    };
+    let (whole, integral) = (mean(Clip::Output), mean(Clip::Integral));
+    println!("mean level and share at a limit: {whole:?} clipped whole, {integral:?} clipped integral");
+    assert!(whole.1 > 0.5 && whole.0 < 14.0, "{whole:?}");
+    assert!((integral.0 - 15.0).abs() < 0.3, "{integral:?}");
 }
