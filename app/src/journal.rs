@@ -108,7 +108,8 @@ fn done(command: &RigCommand) -> String {
             )
         }
         RigCommand::Law { tag, law } => {
-            tr!("event.law", tag = tag, law = tr!(&format!("law.{}", law.id())))
+            let law = tr!(&format!("law.{}", law.id()));
+            tr!("event.law", tag = tag, law = law)
         }
         RigCommand::Options { tag, .. } => tr!("event.options", tag = tag),
         RigCommand::PvFilter { tag, time_constant_s } => {

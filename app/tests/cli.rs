@@ -140,6 +140,102 @@ fn what_is_simulated_is_identified() {
 }
 
 #[test]
+fn every_loop_of_a_run_has_its_figures() {
+    let (run, status) = json(&["simulate", &asset("scenarios/setpoint_coupled.toml"), "--figures", "--json"]);
+    let figures = &run["figures"][0];
+    let expected = [
+        "decay_ratio",
+        "excitation",
+        "final_value",
+        "from_s",
+        "iae",
+        "ie",
+        "ise",
+        "itae",
+        "loop",
+        "max_u",
+        "min_u",
+        "overshoot_percent",
+        "peak_error",
+        "reason",
+        "rise_time_s",
+        "settling_time_s",
+        "steady_error",
+        "total_variation",
+    ];
+    assert_eq!((status, keys(figures)), (0, expected.to_vec()));
+    assert_eq!((&figures["excitation"], &figures["reason"]), (&"setpoint".into(), &Value::Null));
+    assert!(figures["max_u"].as_f64().expect("a number") <= 3.5);
+    let (run, _) = json(&["simulate", &asset("scenarios/setpoint_coupled.toml"), "--json"]);
+    assert!(run.get("figures").is_none());
+}
+
+#[test]
+fn gains_are_converted_with_their_proof_or_refused_with_1() {
+    let convert = |gains: &str, from: &str, to: &str, more: &[&str]| {
+        let arguments = ["controller", "convert", "--gains", gains, "--from", from, "--to", to, "--json"];
+        json(&[&arguments, more].concat())
+    };
+    let (whole, status) = convert("Kc=2,Ti=60,Td=10,N=10", "ideal", "series", &[]);
+    assert_eq!((status, keys(&whole)), (0, vec!["from", "proof", "reason", "to"]));
+    let near = |value: &Value, expected: f64| {
+        let value = value.as_f64().expect("a number");
+        assert!((value / expected - 1.0).abs() < 1e-12, "{value} {expected}");
+    };
+    // τ² − 61 τ + 660 = 0.
+    let larger = 0.5 * (61.0 + (61.0f64 * 61.0 - 4.0 * 660.0).sqrt());
+    near(&whole["to"]["Ti_s"], larger);
+    near(&whole["to"]["Td_s"], 660.0 / larger);
+    near(&whole["to"]["Kc"], 2.0 * larger / 60.0);
+    assert!(whole["proof"]["max_abs_du"].as_f64().expect("a number") < 1e-11);
+    let (none, status) = convert("Kc=1,Ti=4,Td=1", "ideal", "series", &[]);
+    assert!(status == 1 && none["to"].is_null() && none["reason"].as_str().expect("text").contains("17.6"));
+    let spans = ["--mv-span", "2.5", "--pv-span", "24"];
+    let (band, status) = convert("PB=5.787037037037037,repeats_per_min=0.5", "series", "ideal", &spans);
+    assert_eq!(status, 0);
+    near(&band["to"]["Kc"], 1.8);
+    near(&band["to"]["Ti_min"], 2.0);
+    assert!(band["to"]["Td_s"] == 0.0 && band["from"]["PB_percent"].is_number());
+    let own = ["--mapping", "base=series,gain=/100,integral=/60,derivative=1,filter=1"];
+    let (legacy, status) = convert("Kc=2,Ti=60,Td=0", "ideal", "legacy", &own);
+    assert_eq!((status, &legacy["to"]["gain"], &legacy["to"]["integral"]), (0, &50.0.into(), &1.0.into()));
+    let (back, _) = convert("gain=50,integral=1,derivative=0,filter=10", "legacy", "parallel", &own);
+    near(&back["to"]["Kp"], 2.0);
+    near(&back["to"]["Ki"], 2.0 / 60.0);
+    for (arguments, word) in [
+        (&["--from", "ideal", "--to", "magic"][..], "series"),
+        (&["--from", "ideal", "--to", "legacy"][..], "--mapping"),
+        (&["--from", "parallel", "--to", "ideal"][..], "Kp"),
+    ] {
+        let (status, said) = refused(&[&["controller", "convert", "--gains", "Kc=1"], arguments].concat());
+        assert!(status == 2 && said.contains(word), "{arguments:?}: {said}");
+    }
+    let (status, said) =
+        refused(&["controller", "convert", "--gains", "PB=9", "--from", "ideal", "--to", "series"]);
+    assert!(status == 2 && said.contains("--mv-span"), "{said}");
+}
+
+#[test]
+fn the_controller_is_written_as_structured_text() {
+    let path = scratch("pid.st");
+    let st = ["controller", "st", "--gains", "Kc=1.8,Ti=152", "--sample-time", "0.2"];
+    let output =
+        vasos(&[&st, &["--low", "1", "--high", "3.5", "-o", path.to_str().expect("text")][..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(path).expect("a file");
+    assert!(text.contains("FUNCTION_BLOCK PID_I2GL") && text.contains("HI : LREAL := 3.5;"), "{text}");
+    for (arguments, word) in [
+        (&["--gains", "Kc=1", "--sample-time", "1"][..], "integral"),
+        (&["--gains", "Kc=1,Ti=2", "--sample-time", "0"][..], "sample time"),
+        (&["--gains", "Kc=1,Ti=2", "--sample-time", "1", "--low", "2", "--high", "1"][..], "--low"),
+        (&["--gains", "Kc=1,Ti=2", "--sample-time", "1", "--name", "a b"][..], "a b"),
+    ] {
+        let (status, said) = refused(&[&["controller", "st"], arguments].concat());
+        assert!(status == 2 && said.contains(word), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
 fn a_scenario_becomes_a_recording() {
     let path = scratch("run.rrd");
     let scenario = asset("scenarios/setpoint_coupled.toml");

@@ -129,6 +129,28 @@ fn figures_of_a_damped_oscillation_agree_with_the_closed_form() {
     assert!((figures.total_variation / swings - 1.0).abs() < 1e-5, "{}", figures.total_variation);
 }
 
+/// A response without overshoot had a decay ratio of 1 when its samples were noisy: the noise's own swings.
+#[test]
+fn noise_alone_had_a_decay_ratio() {
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let time_s: Vec<f64> = (0..5000).map(|i| f64::from(i) * 0.2).collect();
+    let ratio = |y: &dyn Fn(f64) -> f64, noise: f64, random: &mut dyn FnMut() -> f64| {
+        let y: Vec<f64> = time_s.iter().map(|&t| y(t) + noise * random()).collect();
+        let r = vec![1.0; y.len()];
+        metrics(&time_s, &r, &y, &r, Excitation::Setpoint).expect("figures").decay_ratio
+    };
+    let smooth = |t: f64| 1.0 - (-t / 100.0).exp();
+    assert_eq!(ratio(&smooth, 0.03, &mut random), None);
+    // ζ = 0.1: decay ratio e^(−2πζ/√(1−ζ²)) = 0.532, found through the noise.
+    let swinging = |t: f64| 1.0 - (-0.01 * t).exp() * (0.0995 * t).cos();
+    let found = ratio(&swinging, 0.03, &mut random).expect("it swings");
+    assert!((found - 0.532).abs() < 0.03, "{found}");
+}
+
 /// ITAE of e = e^(−t/T) is T².
 #[test]
 fn itae_of_an_exponential_is_its_time_constant_squared() {

@@ -1,4 +1,4 @@
-//! Files and recordings of Vasos: rig presets and scenarios, plant logs, settings, Rerun.
+//! Files and recordings of Vasos: rig presets and scenarios, plant logs, settings, structured text, Rerun.
 //!
 //! Everything that comes from outside passes here once and leaves as a checked type of the engine, or as
 //! an error that says what to do. The original files are never written to.
@@ -7,3 +7,4 @@ pub mod log;
 pub mod recording;
 pub mod rig;
 pub mod settings;
+pub mod structured_text;

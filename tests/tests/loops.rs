@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use vasos_engine::control::{Action, Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning};
+use vasos_engine::analyze::Excitation;
+use vasos_engine::control::{Action, Clip, Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning, Sends};
 use vasos_engine::document::{Consequence, Document, DocumentCommand, History, rig_commands};
 use vasos_engine::plant::{Measurement, Network, RigError};
 use vasos_engine::session::{CommandError, RigCommand};
-use vasos_engine::sim::{ClosedLoop, LoopTarget};
+use vasos_engine::sim::{ClosedLoop, LoopTarget, Scenario, run_scenario};
 use vasos_io::rig::{FileError, parse_rig, preset};
 
 /// SimTank with three tanks and other loops.
@@ -87,7 +88,7 @@ fn a_cascade_starts_at_rest_and_follows_its_outer_setpoint() {
     assert!((closed.loops()[0].control.mv() - mv).abs() < 1e-4, "it rests");
     assert!((closed.loops()[0].control.setpoint_cm - start).abs() < 1e-4);
     apply(&mut closed, RigCommand::Setpoint { tag: "LIC-03".to_owned(), level_cm: 3.0 });
-    for _ in 0..6000 {
+    for _ in 0..20_000 {
         closed.step();
     }
     assert!((level(&closed, 2) - 3.0).abs() < 1e-3, "{}", level(&closed, 2));
@@ -291,4 +292,50 @@ fn law_and_options_are_undone_and_reach_a_reloaded_rig() {
     let [inner, outer] = running.loops() else { panic!("two loops") };
     assert_eq!((inner.control.mode, outer.control.law().id()), (Mode::Cascade, "pid_i2gl"));
     assert_eq!(outer.control.options(), &LoopOptions::default());
+}
+
+/// The outer loop's figures begin at its setpoint step; the inner loop's setpoint moves all the time.
+#[test]
+fn figures_begin_at_the_last_setpoint_step() {
+    let network = rig(CASCADE).expect("a rig");
+    let text = "schema = 1\nrig = \"x\"\nduration_s = 3000.0\nmeasurement = { noise = false, quantisation = false, \
+                resolution = false }\n[[event]]\nat_s = 100.0\nsetpoint = { tag = \"LIC-03\", level_cm = 3.0 }\n";
+    let scenario: Scenario = toml::from_str(text).expect("a scenario");
+    let figures = run_scenario(network, &scenario).expect("runs").figures();
+    let [inner, outer] = &figures[..] else { panic!("two loops: {figures:?}") };
+    assert_eq!((inner.excitation, inner.from_s), (Excitation::Load, 0.0));
+    assert_eq!((outer.excitation, outer.from_s), (Excitation::Setpoint, 100.0));
+    let metrics = outer.metrics.as_ref().expect("figures");
+    assert!((metrics.final_value - 3.0).abs() < 0.05 && metrics.rise_time_s.is_some(), "{metrics:?}");
+    // PID-I2GL, slow and far from its limits: ∫ e dt = Ti/Kc·Δu.
+    let integral = 120.0 / 2.0 * (metrics.max_u - metrics.min_u);
+    assert!(metrics.ie > 0.0 && metrics.ie < 1.5 * integral, "{} {integral}", metrics.ie);
+}
+
+/// Spec control.md: unfiltered, the paper's AMIGO 7/15/1 has its MV at a limit most of the time; increments that
+/// the limiter cuts are lost to one side and the level sinks. Clipping the integral alone keeps it.
+#[test]
+fn val_noise_at_the_limits_lets_the_level_sink_unless_the_integral_alone_is_clipped() {
+    let mean = |clip| {
+        let network = preset("stad").expect("preset");
+        let mut closed = ClosedLoop::simulated(network, 0, Measurement::DEFAULT, 7).expect("starts");
+        let tag = || "LIC-02".to_owned();
+        let tuning = PidTuning::new(PidGains::pid(7.0, 15.0, 1.0));
+        apply(&mut closed, RigCommand::Tuning { tag: tag(), tuning });
+        let law = Law::PidI2gl { clip, sends: Sends::Position };
+        apply(&mut closed, RigCommand::Law { tag: tag(), law });
+        let (mut sum, mut at_limit) = (0.0, 0);
+        for k in 0..9000 {
+            closed.step();
+            if k >= 4500 {
+                sum += level(&closed, 1) / 4500.0;
+                at_limit += usize::from(closed.loops()[0].control.at_limit().is_some());
+            }
+        }
+        (sum, at_limit as f64 / 4500.0)
+    };
+    let (whole, integral) = (mean(Clip::Output), mean(Clip::Integral));
+    println!("mean level and share at a limit: {whole:?} clipped whole, {integral:?} clipped integral");
+    assert!(whole.1 > 0.5 && whole.0 < 14.0, "{whole:?}");
+    assert!((integral.0 - 15.0).abs() < 0.3, "{integral:?}");
 }

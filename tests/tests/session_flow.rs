@@ -6,7 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use rand::{Rng, RngExt, SeedableRng};
-use vasos_engine::control::{Mode, PidGains, PidTuning};
+use vasos_engine::control::{
+    Action, AntiWindup, Clip, Deadband, Feedforward, Law, LoopOptions, Mode, OutputLimits, PidGains,
+    PidTuning, SchedulePoint, Sends, SetpointPath, SmithModel,
+};
 use vasos_engine::document::{Document, DocumentCommand};
 use vasos_engine::plant::spec::ValveLaw;
 use vasos_engine::plant::{Measurement, Network, RigSpec};
@@ -328,6 +331,11 @@ fn odd_rigs() -> Vec<Rig> {
             spec.pumps[0].delay_s = 0.0;
             spec.configurations.iter_mut().for_each(|c| c.delays_s.clear());
         }),
+        odd("simtank2", |spec| {
+            let [inner, outer] = &mut spec.configurations[0].loops[..] else { panic!("two loops") };
+            inner.mode = Mode::Cascade;
+            (outer.pump, outer.cascade_to, outer.mode) = (None, Some(inner.id.clone()), Mode::Automatic);
+        }),
         odd("simtank1", |spec| {
             spec.pumps.clear();
             spec.sensors.clear();
@@ -416,7 +424,14 @@ fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> Session
     };
     let loops = ["LIC-02", "LIC-03", "LIC-01", "BA01", "", "TQ1"];
     let gains = PidGains { kc: value, ti_s: 20.0 * value, td_s: value / 9.0, n: 10.0 };
-    match rng.random_range(0..36) {
+    match rng.random_range(0..42) {
+        36..=38 => {
+            SessionCommand::Rig(RigCommand::Law { tag: pick(rng, &loops), law: random_law(rng, value) })
+        }
+        39..=41 => {
+            let options = Box::new(random_options(rng, value));
+            SessionCommand::Rig(RigCommand::Options { tag: pick(rng, &loops), options })
+        }
         0 => SessionCommand::Run,
         1 if rng.random_bool(0.2) => SessionCommand::Pause,
         2 if rng.random_bool(0.1) => SessionCommand::Step,
@@ -427,7 +442,7 @@ fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> Session
         }
         5..=8 => SessionCommand::Rig(RigCommand::Setpoint { tag: pick(rng, &loops), level_cm: value }),
         9..=11 => {
-            let mode = if rng.random_bool(0.5) { Mode::Manual } else { Mode::Automatic };
+            let mode = [Mode::Manual, Mode::Automatic, Mode::Cascade][rng.random_range(0..3)];
             SessionCommand::Rig(RigCommand::Mode { tag: pick(rng, &loops), mode })
         }
         12..=15 => SessionCommand::Rig(RigCommand::Mv { tag: pick(rng, &loops), value }),
@@ -461,5 +476,35 @@ fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> Session
         }
         30 => SessionCommand::Rig(RigCommand::Seed { seed: rng.random() }),
         _ => SessionCommand::Run,
+    }
+}
+
+fn random_law(rng: &mut impl Rng, value: f64) -> Law {
+    let clip = if rng.random_bool(0.5) { Clip::Integral } else { Clip::Output };
+    let sends = if rng.random_bool(0.5) { Sends::Increment } else { Sends::Position };
+    let anti_windup = if rng.random_bool(0.5) {
+        AntiWindup::Clamping
+    } else {
+        AntiWindup::BackCalculation { tracking_s: rng.random_bool(0.5).then_some(value) }
+    };
+    let action = if rng.random_bool(0.5) { Action::Direct } else { Action::Reverse };
+    match rng.random_range(0..3) {
+        0 => Law::PidI2gl { clip, sends },
+        1 => Law::Pid2gl { bias: rng.random_bool(0.3).then_some(value), anti_windup },
+        _ => Law::OnOff { gap_cm: value / 10.0, action },
+    }
+}
+
+/// Each option on or off; `value` may be odd.
+fn random_options(rng: &mut impl Rng, value: f64) -> LoopOptions {
+    let from = ["LT02", "LT01", "BA01", "BA02"][rng.random_range(0..4)].to_owned();
+    let mut on = |value: f64| rng.random_bool(0.3).then_some(value);
+    LoopOptions {
+        output: OutputLimits { low: on(value / 20.0), high: on(value / 5.0), rate_per_s: on(value) },
+        setpoint: SetpointPath { ramp_cm_s: on(value), filter_s: on(value).unwrap_or(0.0) },
+        deadband: on(value).map(|half_width_cm| Deadband { half_width_cm, factor: 0.3 }),
+        schedule: on(value).map(|kc| SchedulePoint { level_cm: 7.0, kc, ti_s: None }).into_iter().collect(),
+        feedforward: on(value).map(|gain| Feedforward { from, gain, lead_s: 3.0, lag_s: value }),
+        smith: on(value).map(|gain| SmithModel { gain, time_constant_s: value, dead_time_s: value / 2.0 }),
     }
 }

@@ -4,9 +4,11 @@
 //! text says as JSON, non-finite and absent numbers as `null`; its keys are an interface.
 
 mod analyze;
+mod controller;
 mod identify;
 mod json;
 pub mod parse;
+mod parse_gains;
 mod simulate;
 mod tune;
 
@@ -26,7 +28,8 @@ Examples:
   vasos simulate run.toml -o run.csv
   vasos identify step.csv --pv h2 --mv u --json
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
-  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152";
+  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
+  vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series";
 
 /// Process control workbench: simulate, identify, tune, analyse.
 #[derive(Debug, Parser)]
@@ -50,6 +53,8 @@ pub enum Command {
     Tune(tune::Arguments),
     /// Judge a controller on a model: stability, margins, sensitivities, responses.
     Analyze(analyze::Arguments),
+    /// Convert gains between the forms of controllers, or write a controller as structured text.
+    Controller(controller::Arguments),
     /// Not available yet: identify, tune, compare and report in one go.
     Retune(Later),
     /// Not available yet: fit a rig to a recording.
@@ -135,6 +140,7 @@ pub fn run(cli: Cli) -> CliOutcome {
         Command::Identify(arguments) => identify::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Analyze(arguments) => analyze::run(arguments),
+        Command::Controller(arguments) => controller::run(arguments),
         Command::Retune(_) => Err(Refusal::later("vasos retune")),
         Command::FitPlant(_) => Err(Refusal::later("vasos fit-plant")),
         Command::Serve(_) => Err(Refusal::later("vasos serve")),

@@ -126,13 +126,13 @@ impl ParseError {
 }
 
 /// Named parts of one argument, each used once.
-struct Parts<'a> {
+pub(super) struct Parts<'a> {
     parts: Vec<(&'a str, &'a str)>,
     form: &'static str,
 }
 
 impl<'a> Parts<'a> {
-    fn of(text: &'a str, form: &'static str) -> Result<Self, ParseError> {
+    pub(super) fn of(text: &'a str, form: &'static str) -> Result<Self, ParseError> {
         let mut parts: Vec<(&str, &str)> = Vec::new();
         for part in text.split([',', ';']).map(str::trim).filter(|part| !part.is_empty()) {
             let Some((name, value)) = part.split_once('=') else {
@@ -147,20 +147,20 @@ impl<'a> Parts<'a> {
         Ok(Self { parts, form })
     }
 
-    fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.parts.iter().any(|(other, _)| other.eq_ignore_ascii_case(name))
     }
 
-    fn text(&mut self, name: &str) -> Option<&'a str> {
+    pub(super) fn text(&mut self, name: &str) -> Option<&'a str> {
         let at = self.parts.iter().position(|(other, _)| other.eq_ignore_ascii_case(name))?;
         Some(self.parts.remove(at).1)
     }
 
-    fn optional(&mut self, name: &str) -> Result<Option<f64>, ParseError> {
+    pub(super) fn optional(&mut self, name: &str) -> Result<Option<f64>, ParseError> {
         self.text(name).map(|text| number(name, text)).transpose()
     }
 
-    fn needed(&mut self, name: &'static str) -> Result<f64, ParseError> {
+    pub(super) fn needed(&mut self, name: &'static str) -> Result<f64, ParseError> {
         self.optional(name)?.ok_or(ParseError::Missing { name, form: self.form })
     }
 
@@ -169,7 +169,7 @@ impl<'a> Parts<'a> {
         text.trim_matches(['[', ']']).split_whitespace().map(|word| number(name, word)).collect()
     }
 
-    fn end(self) -> Result<(), ParseError> {
+    pub(super) fn end(self) -> Result<(), ParseError> {
         match self.parts.first() {
             Some((name, _)) => Err(ParseError::UnknownName { name: (*name).to_owned(), form: self.form }),
             None => Ok(()),
@@ -177,7 +177,7 @@ impl<'a> Parts<'a> {
     }
 }
 
-fn number(name: &str, text: &str) -> Result<f64, ParseError> {
+pub(super) fn number(name: &str, text: &str) -> Result<f64, ParseError> {
     let text = text.strip_suffix('s').map_or(text, str::trim);
     let value = if text == "∞" { Ok(f64::INFINITY) } else { text.parse::<f64>() };
     value.map_err(|_| ParseError::NotANumber { name: name.to_owned(), text: text.to_owned() })

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
+use vasos_engine::analyze::{Excitation, Metrics};
 use vasos_engine::plant::Network;
 use vasos_engine::session::{Event, EventKind};
 use vasos_engine::signal::SampleBlock;
-use vasos_engine::sim::{Run, Scenario, run_scenario};
+use vasos_engine::sim::{LoopFigures, Run, Scenario, run_scenario};
 use vasos_io::recording::{Recording, RecordingOptions};
 use vasos_io::rig::{load_scenario, write_run_csv};
 
@@ -23,13 +24,19 @@ const BLOCK: usize = 5000;
 Examples:
   vasos simulate assets/scenarios/setpoint_coupled.toml -o run.csv
   vasos simulate run.toml -o run.rrd     (a recording, for Rerun's viewer)
-Without -o the values at the end are printed. The format of scenarios is in assets/SCHEMA.md.")]
+Without -o the values at the end are printed. The format of scenarios is in assets/SCHEMA.md.
+--figures: of each loop from its last setpoint step to the end; without a step, or where the setpoint is another
+loop's output, of the whole run as after a load. They are taken from the rows that are kept (keep_every).")]
 pub struct Arguments {
     /// Scenario file (TOML).
     scenario: PathBuf,
     /// File to write: .csv or .rrd; .parquet is not available yet. An existing file is replaced.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Add IE, IAE, ISE, ITAE, overshoot, decay ratio, rise and settling time, steady error, total variation of
+    /// every loop.
+    #[arg(long)]
+    figures: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -49,23 +56,88 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let channels = &run.channels.channels;
     if arguments.json {
         let end: Map<_, _> = channels.iter().zip(last).map(|(c, v)| (c.name.clone(), json!(v))).collect();
-        let whole = json!({
+        let mut whole = json!({
             "rig": scenario.rig,
             "rows": run.time_s.len(),
             "end_time_s": run.time_s.last(),
             "end": end,
             "output": arguments.output.as_ref().map(|p| p.display().to_string()),
         });
+        if arguments.figures {
+            whole["figures"] = run.figures().iter().map(figures_json).collect();
+        }
         return Ok(Answer::done(json::text(&whole)));
     }
+    let figures = if arguments.figures { figures_table(&run) } else { String::new() };
     let mut text = format!("{} rows to {} s", run.time_s.len(), shown(run.time_s.last().copied()));
     if let Some(path) = &arguments.output {
-        text.push_str(&format!(", written to {}", path.display()));
+        text.push_str(&format!(", written to {}\n{figures}", path.display()));
         return Ok(Answer::done(text));
     }
     let rows: Vec<Vec<String>> =
         channels.iter().zip(last).map(|(c, v)| vec![c.name.clone(), shown(Some(*v))]).collect();
-    Ok(Answer::done(format!("{text}; at its end:\n{}", table(&rows))))
+    Ok(Answer::done(format!("{text}; at its end:\n{}{figures}", table(&rows))))
+}
+
+/// Figures by their names in JSON; None for what does not exist.
+fn named(m: &Metrics) -> [(&'static str, Option<f64>); 14] {
+    [
+        ("ie", Some(m.ie)),
+        ("iae", Some(m.iae)),
+        ("ise", Some(m.ise)),
+        ("itae", Some(m.itae)),
+        ("peak_error", Some(m.peak_error)),
+        ("final_value", Some(m.final_value)),
+        ("steady_error", Some(m.steady_error)),
+        ("overshoot_percent", m.overshoot_percent),
+        ("decay_ratio", m.decay_ratio),
+        ("rise_time_s", m.rise_time_s),
+        ("settling_time_s", m.settling_time_s),
+        ("total_variation", Some(m.total_variation)),
+        ("max_u", Some(m.max_u)),
+        ("min_u", Some(m.min_u)),
+    ]
+}
+
+/// Number of a loop as its columns have it, from 1.
+fn loop_number(figures: &LoopFigures) -> usize {
+    figures.slot + 1
+}
+
+fn figures_json(figures: &LoopFigures) -> Value {
+    let mut whole = Map::new();
+    whole.insert("loop".into(), json!(loop_number(figures)));
+    whole.insert("from_s".into(), json!(figures.from_s));
+    whole.insert("excitation".into(), json!(excitation(figures)));
+    let values = figures.metrics.as_ref().ok().map(named);
+    for (name, value) in values.into_iter().flatten() {
+        whole.insert(name.into(), json!(value));
+    }
+    whole.insert("reason".into(), json!(figures.metrics.as_ref().err().map(ToString::to_string)));
+    Value::Object(whole)
+}
+
+fn excitation(figures: &LoopFigures) -> &'static str {
+    match figures.excitation {
+        Excitation::Setpoint => "setpoint",
+        Excitation::Load => "load",
+    }
+}
+
+fn figures_table(run: &Run) -> String {
+    let mut text = String::new();
+    for figures in run.figures() {
+        let from = shown(Some(figures.from_s));
+        text.push_str(&format!("loop {}, {} from {from} s:\n", loop_number(&figures), excitation(&figures)));
+        match &figures.metrics {
+            Ok(metrics) => {
+                let rows = named(metrics).map(|(name, value)| vec![format!("  {name}"), shown(value)]);
+                text.push_str(&table(&rows));
+            }
+            Err(reason) => text.push_str(&format!("  {reason}\n")),
+        }
+    }
+    text
 }
 
 #[derive(Clone, Copy)]

@@ -35,7 +35,8 @@ pub struct Metrics {
     pub steady_error: f64,
     /// How far y passes the final value, in percent of the way to it; setpoint steps only.
     pub overshoot_percent: Option<f64>,
-    /// Second excursion beyond the final value over the first on the same side; none with fewer than two.
+    /// Second excursion beyond the final value over the first on the same side; none with fewer than two that
+    /// stand out from the noise.
     pub decay_ratio: Option<f64>,
     /// From 10 to 90 % of the way to the final value, in seconds; setpoint steps only.
     pub rise_time_s: Option<f64>,
@@ -129,8 +130,10 @@ const FINAL_SHARE: f64 = 0.05;
 const SETTLING_BAND: f64 = 0.02;
 /// Rise time counts between these shares of the way.
 const RISE: (f64, f64) = (0.1, 0.9);
-/// Excursions under this share of the way are rounding, not a decaying oscillation.
+/// Excursions under this share of the way are rounding, not a decaying oscillation …
 const LEAST_EXCURSION: f64 = 1e-3;
+/// … nor are those under this many standard deviations of the noise.
+const NOISE_EXCURSION: f64 = 5.0;
 
 /// Figures of a run from its samples: times in seconds, setpoint, PV and MV.
 ///
@@ -251,23 +254,42 @@ fn settling_time(time_s: &[f64], shares: &[f64]) -> Option<f64> {
     Some(start + fraction * (end - start) - time_s[0])
 }
 
+/// Standard deviation of what is noise in equally spaced samples: from the median of the fourth differences, in
+/// which a smooth response all but vanishes and independent noise has 70 times its variance.
+fn noise(shares: &[f64]) -> f64 {
+    let fourth = |w: &[f64]| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs();
+    let mut differences: Vec<f64> = shares.windows(5).map(fourth).collect();
+    let middle = differences.len() / 2;
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let (_, median, _) = differences.select_nth_unstable_by(middle, f64::total_cmp);
+    // The median of |x| of a normal distribution is 0.6745 σ.
+    *median / (0.6745 * 70f64.sqrt())
+}
+
 /// Third excursion from the final value over the first, counted from where y first overshoots (or first leaves).
 fn decay_ratio(shares: &[f64], excitation: Excitation) -> Option<f64> {
+    let least = LEAST_EXCURSION.max(NOISE_EXCURSION * noise(shares));
     let mut excursions: Vec<f64> = Vec::new();
     let mut current = 0.0f64;
-    for &s in shares {
-        if s * current < 0.0 {
-            if current.abs() > LEAST_EXCURSION {
-                excursions.push(current);
+    for &s in shares.iter().chain(std::iter::once(&f64::NAN)) {
+        if s.is_nan() || s * current < 0.0 {
+            match excursions.last_mut() {
+                _ if current.abs() <= least => {}
+                // Noise crossed the final value in the middle of a swing.
+                Some(last) if *last * current > 0.0 => {
+                    if current.abs() > last.abs() {
+                        *last = current;
+                    }
+                }
+                _ => excursions.push(current),
             }
             current = 0.0;
         }
         if s.abs() > current.abs() {
             current = s;
         }
-    }
-    if current.abs() > LEAST_EXCURSION {
-        excursions.push(current);
     }
     // A setpoint step starts a full way below the final value: that is not an excursion.
     let first = usize::from(excitation == Excitation::Setpoint);

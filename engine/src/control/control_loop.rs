@@ -262,7 +262,7 @@ impl ControlLoop {
     }
 
     /// One sample.
-    pub fn update(&mut self, input: &LoopInput) -> ControlOutput {
+    pub fn update(&mut self, input: &LoopInput) -> &ControlOutput {
         self.actual = input.actual;
         let level_cm = self.filter(input.pv_cm);
         let remote = input.actual == Mode::Cascade;
@@ -287,7 +287,7 @@ impl ControlLoop {
         if let Some(smith) = &mut self.smith {
             smith.advance(self.last.mv);
         }
-        self.last
+        &self.last
     }
 
     fn filter(&mut self, pv_cm: f64) -> f64 {

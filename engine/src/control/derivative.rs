@@ -43,7 +43,20 @@ impl Signals {
     }
 }
 
-/// K·h/(2Ti)·(e_k + e_{k−1}): the integral over one sample by the trapezoidal rule; 0 for Ti = ∞.
-pub(super) fn integral_step(gains: &PidGains, sample_time_s: f64, now: Signals, last: Signals) -> f64 {
-    gains.kc * sample_time_s / (2.0 * gains.ti_s) * (now.error() + last.error())
+/// Coefficients of a sampled PID, worked out once for each tuning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sampled {
+    /// a_d of the derivative.
+    pub a_d: f64,
+    /// b_d of the derivative.
+    pub b_d: f64,
+    /// K·h/(2Ti), factor on e_k + e_{k−1} by the trapezoidal rule; 0 for Ti = ∞.
+    pub integral: f64,
+}
+
+impl Sampled {
+    pub fn of(gains: &PidGains, sample_time_s: f64) -> Self {
+        let (a_d, b_d) = derivative_coefficients(gains, sample_time_s);
+        Self { a_d, b_d, integral: gains.kc * sample_time_s / (2.0 * gains.ti_s) }
+    }
 }

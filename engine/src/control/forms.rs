@@ -242,7 +242,8 @@ impl FormGains {
             Self::Ideal(gains) => gains.at_omega(omega_rad_s),
             Self::Parallel(g) => g.kp + g.ki / s + g.kd * s / (1.0 + s * g.tf_s),
             Self::Series(g) => {
-                g.kc * (1.0 + 1.0 / (s * g.ti_s)) * (1.0 + s * g.td_s) / (1.0 + s * g.td_s / g.n)
+                let integral = if g.ti_s.is_finite() { 1.0 / (s * g.ti_s) } else { Complex64::new(0.0, 0.0) };
+                g.kc * (1.0 + integral) * (1.0 + s * g.td_s) / (1.0 + s * g.td_s / g.n)
             }
         }
     }

@@ -18,10 +18,12 @@ mod on_off;
 mod options;
 mod pid_2gl;
 mod pid_i2gl;
+mod proof;
 mod schedule;
 mod setpoint_path;
 mod smith;
 mod tuning;
+mod units;
 mod wiring;
 
 pub use control_loop::{ControlLoop, LoopInput, OutputRange};
@@ -37,8 +39,13 @@ pub use on_off::OnOff;
 pub use options::{LoopOptions, OutputLimits};
 pub use pid_2gl::Pid2gl;
 pub use pid_i2gl::PidI2gl;
+pub use proof::{Proof, prove};
 pub use schedule::{SchedulePoint, scheduled};
 pub use setpoint_path::{SetpointPath, SetpointShaper};
 pub use smith::{SmithModel, SmithPredictor};
 pub use tuning::PidTuning;
+pub use units::{
+    Mapping, Scale, ShownGains, kc_of_proportional_band, proportional_band_percent, repeats_per_min,
+    repeats_per_s,
+};
 pub use wiring::{check_loop, check_loops, execution_order, final_pump, outer_of, output_range};

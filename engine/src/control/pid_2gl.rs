@@ -16,7 +16,7 @@
 //! 2nd ed., 1995, sections 3.4 to 3.6.
 
 use super::controller::{ControlInput, ControlOutput, Controller, Parts};
-use super::derivative::{Signals, derivative_coefficients, integral_step};
+use super::derivative::{Sampled, Signals};
 use super::law::AntiWindup;
 use super::tuning::PidTuning;
 
@@ -24,6 +24,7 @@ use super::tuning::PidTuning;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pid2gl {
     tuning: PidTuning,
+    sampled: Sampled,
     anti_windup: AntiWindup,
     sample_time_s: f64,
     bias: Option<f64>,
@@ -49,6 +50,7 @@ impl Pid2gl {
     ) -> Self {
         Self {
             tuning,
+            sampled: Sampled::of(&tuning.gains, sample_time_s),
             anti_windup,
             sample_time_s,
             bias,
@@ -98,11 +100,11 @@ impl Controller for Pid2gl {
         }
         let last = self.last.unwrap_or(now);
         let PidTuning { gains, b, c } = self.tuning;
-        let (a_d, b_d) = derivative_coefficients(&gains, self.sample_time_s);
+        let Sampled { a_d, b_d, integral } = self.sampled;
         let derivative = a_d * self.derivative + b_d * (now.weighted(c) - last.weighted(c));
         let bias = self.bias.unwrap_or(0.0);
         let without_integral = bias + gains.kc * now.weighted(b) + derivative + input.feedforward;
-        let mut step = integral_step(&gains, self.sample_time_s, now, last);
+        let mut step = integral * (now.error() + last.error());
         if !(without_integral + step).is_finite() {
             return ControlOutput::held(self.mv);
         }
@@ -162,6 +164,7 @@ impl Controller for Pid2gl {
     }
 
     fn set_tuning(&mut self, tuning: PidTuning) {
+        self.sampled = Sampled::of(&tuning.gains, self.sample_time_s);
         self.tuning = tuning;
     }
 }

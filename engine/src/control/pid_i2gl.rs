@@ -19,7 +19,7 @@
 //! ```
 
 use super::controller::{ControlInput, ControlOutput, Controller, Limits, Mode, Parts};
-use super::derivative::{Signals, derivative_coefficients, integral_step};
+use super::derivative::{Sampled, Signals};
 use super::law::Clip;
 use super::tuning::PidTuning;
 
@@ -27,6 +27,7 @@ use super::tuning::PidTuning;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PidI2gl {
     tuning: PidTuning,
+    sampled: Sampled,
     clip: Clip,
     sample_time_s: f64,
     limits: Limits,
@@ -51,6 +52,7 @@ impl PidI2gl {
         let limits = Limits { low: f64::NEG_INFINITY, high: f64::INFINITY };
         Self {
             tuning,
+            sampled: Sampled::of(&tuning.gains, sample_time_s),
             clip: Clip::Output,
             sample_time_s,
             limits,
@@ -94,6 +96,9 @@ impl PidI2gl {
         if old.td_s != new.td_s || old.n != new.n {
             self.derivative = 0.0;
         }
+        if old != new {
+            self.sampled = Sampled::of(&new, self.sample_time_s);
+        }
         self.tuning = tuning;
     }
 
@@ -108,7 +113,7 @@ impl PidI2gl {
     /// a_d and b_d of the derivative filter for the present tuning.
     #[must_use]
     pub fn derivative_coefficients(&self) -> (f64, f64) {
-        derivative_coefficients(&self.tuning.gains, self.sample_time_s)
+        (self.sampled.a_d, self.sampled.b_d)
     }
 
     /// One sample: setpoint and PV in PV units. In manual only r, y and D are kept up to date.
@@ -148,11 +153,11 @@ impl Controller for PidI2gl {
         }
         let last = self.last.unwrap_or(now);
         let PidTuning { gains, b, c } = self.tuning;
-        let (a_d, b_d) = self.derivative_coefficients();
+        let Sampled { a_d, b_d, integral } = self.sampled;
         let derivative = a_d * self.derivative + b_d * (now.weighted(c) - last.weighted(c));
         let parts = Parts {
             p: gains.kc * (now.weighted(b) - last.weighted(b)),
-            i: integral_step(&gains, self.sample_time_s, now, last),
+            i: integral * (now.error() + last.error()),
             d: derivative - self.derivative,
             feedforward: input.feedforward - self.last_feedforward.unwrap_or(input.feedforward),
             bias: 0.0,

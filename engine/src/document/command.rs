@@ -191,32 +191,13 @@ impl Document {
                 }
                 next.rig.configure(*index);
             }
-            DocumentCommand::Setpoint(tag, level_cm) => {
-                next.check_setpoint(tag, *level_cm)?;
-                let settings = next.settings(tag)?;
-                if settings.mode == Mode::Cascade {
-                    return Err(CommandError::Cascade { tag: tag.clone() }.into());
-                }
-                settings.setpoint_cm = *level_cm;
-            }
-            DocumentCommand::Mode(tag, mode) => next.set_loop(tag, |l| l.mode = *mode)?,
-            DocumentCommand::Tuning(tag, tuning) => {
-                tuning.validated(&next.settings(tag)?.law).map_err(CommandError::from)?;
-                next.set_loop(tag, |l| l.tuning = *tuning)?;
-            }
-            DocumentCommand::Law(tag, law) => next.set_loop(tag, |l| l.law = *law)?,
-            DocumentCommand::Options(tag, options) => {
-                next.set_loop(tag, |l| l.options.clone_from(options))?;
-            }
-            DocumentCommand::PvFilter(tag, filter_s) => {
-                next.settings(tag)?.pv_filter_s = check_filter(*filter_s).map_err(CommandError::from)?;
-            }
-            DocumentCommand::ApplyTuning(tag, tuning, filter_s) => {
-                let usable = |e: GainsError| CommandError::from(e);
-                tuning.validated(&next.settings(tag)?.law).map_err(usable)?;
-                let filter_s = check_filter(*filter_s).map_err(usable)?;
-                next.set_loop(tag, |l| (l.tuning, l.pv_filter_s) = (*tuning, filter_s))?;
-            }
+            DocumentCommand::Setpoint(..)
+            | DocumentCommand::Mode(..)
+            | DocumentCommand::Tuning(..)
+            | DocumentCommand::Law(..)
+            | DocumentCommand::Options(..)
+            | DocumentCommand::PvFilter(..)
+            | DocumentCommand::ApplyTuning(..) => next.change_loop(command)?,
             DocumentCommand::Angle(tag, angle_deg) => next.turn(tag, *angle_deg)?,
             DocumentCommand::Measurement(measurement) => next.rig.measurement = *measurement,
             DocumentCommand::Seed(seed) => next.rig.seed = *seed,
@@ -268,6 +249,40 @@ impl Document {
             }
         }
         Ok(next)
+    }
+
+    /// Carries out a command for one loop; others change nothing.
+    fn change_loop(&mut self, command: &DocumentCommand) -> Result<(), DocumentError> {
+        match command {
+            DocumentCommand::Setpoint(tag, level_cm) => {
+                self.check_setpoint(tag, *level_cm)?;
+                let settings = self.settings(tag)?;
+                if settings.mode == Mode::Cascade {
+                    return Err(CommandError::Cascade { tag: tag.clone() }.into());
+                }
+                settings.setpoint_cm = *level_cm;
+            }
+            DocumentCommand::Mode(tag, mode) => self.set_loop(tag, |l| l.mode = *mode)?,
+            DocumentCommand::Tuning(tag, tuning) => {
+                tuning.validated(&self.settings(tag)?.law).map_err(CommandError::from)?;
+                self.set_loop(tag, |l| l.tuning = *tuning)?;
+            }
+            DocumentCommand::Law(tag, law) => self.set_loop(tag, |l| l.law = *law)?,
+            DocumentCommand::Options(tag, options) => {
+                self.set_loop(tag, |l| l.options.clone_from(options))?;
+            }
+            DocumentCommand::PvFilter(tag, filter_s) => {
+                self.settings(tag)?.pv_filter_s = check_filter(*filter_s).map_err(CommandError::from)?;
+            }
+            DocumentCommand::ApplyTuning(tag, tuning, filter_s) => {
+                let usable = |e: GainsError| CommandError::from(e);
+                tuning.validated(&self.settings(tag)?.law).map_err(usable)?;
+                let filter_s = check_filter(*filter_s).map_err(usable)?;
+                self.set_loop(tag, |l| (l.tuning, l.pv_filter_s) = (*tuning, filter_s))?;
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     fn settings(&mut self, tag: &str) -> Result<&mut LoopSettings, DocumentError> {
