@@ -6,4 +6,5 @@
 pub mod log;
 pub mod recording;
 pub mod rig;
+mod rig_lines;
 pub mod settings;
