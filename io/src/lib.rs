@@ -6,5 +6,6 @@
 pub mod log;
 pub mod recording;
 pub mod rig;
+mod rig_lines;
 pub mod settings;
 pub mod structured_text;

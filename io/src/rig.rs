@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::rig_lines::{line_of, line_of_configuration};
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::{Network, RigError, RigSpec};
 use vasos_engine::session::CommandError;
@@ -52,18 +53,22 @@ pub enum FileError {
         reason: String,
     },
     /// It describes a rig that cannot be.
-    #[error("{name}: {error}")]
+    #[error("{}: {error}", place(name, *.line))]
     Rig {
         /// File name.
         name: String,
+        /// Line of the item or field at fault, from 1, where it has one.
+        line: Option<usize>,
         /// What is wrong.
         error: RigError,
     },
     /// It describes a rig that cannot start.
-    #[error("{name}: the rig cannot start in the configuration '{configuration}': {error}")]
+    #[error("{}: the rig cannot start in the configuration '{configuration}': {error}", place(name, *.line))]
     Start {
         /// File name.
         name: String,
+        /// Line of the configuration, from 1, where there is one.
+        line: Option<usize>,
         /// Id of the configuration; the rig's where it has none.
         configuration: String,
         /// Why not.
@@ -79,13 +84,19 @@ pub enum FileError {
     },
 }
 
+fn place(name: &str, line: Option<usize>) -> String {
+    line.map_or_else(|| name.to_owned(), |line| format!("{name}, line {line}"))
+}
+
 impl Explain for FileError {
     fn key(&self) -> &'static str {
         match self {
             Self::Read { .. } => "file.read",
             Self::Format { .. } => "file.format",
-            Self::Rig { .. } => "file.rig",
-            Self::Start { .. } => "file.start",
+            Self::Rig { line: None, .. } => "file.rig",
+            Self::Rig { .. } => "file.rig_line",
+            Self::Start { line: None, .. } => "file.start",
+            Self::Start { .. } => "file.start_line",
             Self::Write { .. } => "file.write",
         }
     }
@@ -98,12 +109,20 @@ impl Explain for FileError {
             Self::Format { name, line, reason } => {
                 vec![("name", name.clone()), ("line", line.to_string()), ("reason", reason.clone())]
             }
-            Self::Rig { name, error } => vec![("name", name.clone()), ("error", error.to_string())],
-            Self::Start { name, configuration, error } => vec![
-                ("name", name.clone()),
-                ("configuration", configuration.clone()),
-                ("error", error.to_string()),
-            ],
+            Self::Rig { name, line, error } => {
+                let mut args = vec![("name", name.clone()), ("error", error.to_string())];
+                args.extend(line.map(|line| ("line", line.to_string())));
+                args
+            }
+            Self::Start { name, line, configuration, error } => {
+                let mut args = vec![
+                    ("name", name.clone()),
+                    ("configuration", configuration.clone()),
+                    ("error", error.to_string()),
+                ];
+                args.extend(line.map(|line| ("line", line.to_string())));
+                args
+            }
         }
     }
 
@@ -121,15 +140,19 @@ impl FileError {
     #[must_use]
     pub fn samples() -> Vec<Self> {
         let text = |t: &str| t.to_owned();
+        let start = |line| Self::Start {
+            name: text("a.toml"),
+            line,
+            configuration: text("coupled"),
+            error: Box::new(CommandError::UnknownTag { tag: text("LIC-01") }),
+        };
         vec![
             Self::Read { path: text("a.toml"), reason: text("not found") },
             Self::Format { name: text("a.toml"), line: 3, reason: text("expected a number") },
-            Self::Rig { name: text("a.toml"), error: RigError::NoTank },
-            Self::Start {
-                name: text("a.toml"),
-                configuration: text("coupled"),
-                error: Box::new(CommandError::UnknownTag { tag: text("LIC-01") }),
-            },
+            Self::Rig { name: text("a.toml"), line: None, error: RigError::NoTank },
+            Self::Rig { name: text("a.toml"), line: Some(12), error: RigError::NoTank },
+            start(None),
+            start(Some(70)),
             Self::Write { path: text("a.csv"), reason: text("disk full") },
         ]
     }
@@ -153,10 +176,15 @@ pub fn preset(id: &str) -> Result<Arc<Network>, FileError> {
 /// [`FileError`] with the line, the item and value that cannot be, or the configuration that cannot start.
 pub fn parse_rig(name: &str, text: &str) -> Result<Arc<Network>, FileError> {
     let spec: RigSpec = parse(name, text)?;
-    let network = Network::new(spec).map_err(|error| FileError::Rig { name: name.to_owned(), error })?;
+    let network = Network::new(spec).map_err(|error| FileError::Rig {
+        name: name.to_owned(),
+        line: line_of(text, &error),
+        error,
+    })?;
     let network = Arc::new(network);
     check_starts(&network).map_err(|start| FileError::Start {
         name: name.to_owned(),
+        line: line_of_configuration(text, &start.configuration),
         configuration: start.configuration,
         error: Box::new(start.error),
     })?;
@@ -181,10 +209,11 @@ pub fn load_rig(id_or_path: &str) -> Result<Arc<Network>, FileError> {
 /// [`FileError`].
 pub fn load_scenario(path: &Path) -> Result<(Scenario, Arc<Network>), FileError> {
     let name = file_name(path);
-    let scenario: Scenario = parse(&name, &read_text(path)?)?;
+    let text = read_text(path)?;
+    let scenario: Scenario = parse(&name, &text)?;
     if scenario.schema != 1 {
         let error = RigError::Schema { found: scenario.schema, known: 1 };
-        return Err(FileError::Rig { name, error });
+        return Err(FileError::Rig { name, line: line_of(&text, &error), error });
     }
     let network = if PRESETS.iter().any(|p| p.id == scenario.rig) {
         preset(&scenario.rig)?

@@ -114,6 +114,65 @@ fn a_rig_that_cannot_start_was_refused_only_after_the_old_one_was_gone() {
     assert!(matches!(error, CommandError::Rig(RigError::Unreachable { .. })), "{error}");
 }
 
+/// A bad file is mended where its error points: the line, the field and what was expected.
+#[test]
+fn errors_name_the_line_and_what_was_expected() {
+    let stad = PRESETS[0].text;
+    // What is replaced, by what, and what the sentence must hold.
+    let cases = [
+        ("area_cm2 = 450.0", "area_cm2 = -450.0", "TQ4: area_cm2 = -450 is not possible; it must be"),
+        ("exponent = 3.0", "exponent = nan", "FV01: exponent = NaN"),
+        (
+            "setpoint_cm = 15.0\nmode = \"automatic\"\nkc = 0.9",
+            "setpoint_cm = 28.0\nmode = \"automatic\"\nkc = 0.9",
+            "it must be 0…27 (rim)",
+        ),
+        ("sensor = \"LT03\"", "sensor = \"LT09\"", "refers to LT09"),
+        ("to = \"TQ2\"", "to = \"TQ9\"", "FV02 refers to TQ9"),
+        ("angles_deg = { FV01 = 90.0", "angles_deg = { FV01 = 95.0", "FV01: angle_deg = 95"),
+        ("delays_s = { BA01 = 1.3 }", "delays_s = { BA02 = 1.3 }", "decoupled refers to BA02"),
+        ("signal = \"q3\"", "signal = \"q1\"", "q1 is used twice"),
+        ("id = \"LT03\"", "id = \"LT 3\"", "'LT 3'"),
+        ("shunt_ohm = 250.0", "shunt_ohm = 0.0", "shunt_ohm = 0"),
+        ("reservoir = \"TQ4\"", "reservoir = \"TQ5\"", "stad refers to TQ5"),
+        ("curve = [\n  [1.1, 0], [1.2, 0]", "curve = [\n  [1.1, 0], [1.1, 0]", "curve of pump BA01"),
+        (
+            "spills_to = \"TQ4\"\nat = [1.0, 2.0]",
+            "spills_to = \"TQ3\"\nat = [1.0, 2.0]",
+            "TQ3 leads from TQ3",
+        ),
+        ("schema = 1", "schema = 9", "schema 9"),
+        (
+            "height_cm = 27.0\ninitial_cm = 26.0",
+            "height_cm = \"27\"\ninitial_cm = 26.0",
+            "invalid type: string",
+        ),
+        ("k90 = 60.0", "k9 = 60.0", "unknown field `k9`"),
+    ];
+    for (from, to, says) in cases {
+        let at = stad.find(from).unwrap_or_else(|| panic!("the preset holds {from}"));
+        let line = stad[..at].matches('\n').count() + 1;
+        let text = stad.replacen(from, to, 1);
+        let error = parse_rig("stad.toml", &text).expect_err(to).to_string();
+        println!("{error}");
+        assert!(error.starts_with(&format!("stad.toml, line {line}: ")), "{to}: line {line}: {error}");
+        assert!(error.contains(says), "{to}: {error}");
+    }
+    // Two loops on one pump: the second one's line.
+    let second = "\n[[configuration.loop]]\nid = \"LIC-09\"\nsensor = \"LT02\"\npump = \"BA01\"\nsetpoint_cm = 5.0\nmode = \"manual\"\nkc = 1.0\nti_s = 9.0\n";
+    let error = parse_rig("stad.toml", &format!("{stad}{second}")).expect_err("one pump").to_string();
+    let line = stad.lines().count() + 5;
+    assert!(error.starts_with(&format!("stad.toml, line {line}: the loops LIC-03 and LIC-09")), "{error}");
+    // A level no input holds: the configuration's line.
+    let from = "setpoint_cm = 15.0\nmode = \"automatic\"\nkc = 0.9";
+    let high = stad.replacen(from, &from.replace("15.0", "26.9"), 1);
+    let at = stad.find("id = \"decoupled\"").expect("a configuration");
+    let line = stad[..at].matches('\n').count() + 1;
+    let error = parse_rig("stad.toml", &high).expect_err("too high").to_string();
+    assert!(error.starts_with(&format!("stad.toml, line {line}: the rig cannot start")), "{error}");
+    assert!(error.contains("between"), "{error}");
+}
+
 /// The program reads all presets when it starts.
 #[test]
 fn presets_are_read_before_anybody_notices() {

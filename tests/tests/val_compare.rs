@@ -12,7 +12,7 @@ fn series(point: &OperatingPoint, moves_v: &[f64], hold_s: f64) -> InputSeries {
     let time_s: Vec<f64> = (0..rows).map(|k| 0.2 * k as f64).collect();
     let at = |t: &f64| moves_v[((t / hold_s) as usize).min(moves_v.len() - 1)];
     let column = time_s.iter().map(|t| point.inputs[0] + at(t)).collect();
-    InputSeries { time_s, inputs: vec![column], start: point.clone() }
+    InputSeries { time_s, inputs: vec![column], angles_deg: vec![], start: point.clone() }
 }
 
 struct Case {

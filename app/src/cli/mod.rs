@@ -4,11 +4,14 @@
 //! text says as JSON, non-finite and absent numbers as `null`; its keys are an interface.
 
 mod analyze;
+mod compare;
 mod controller;
 mod identify;
 mod json;
+mod model;
 pub mod parse;
 mod parse_gains;
+mod point;
 mod simulate;
 mod tune;
 
@@ -26,6 +29,8 @@ Examples:
   vasos                                      open the workbench
   vasos step.csv                             open it with a log
   vasos simulate run.toml -o run.csv
+  vasos model stad --at LIC-02=19
+  vasos compare run.toml --recording run.csv --column h2_cm
   vasos identify step.csv --pv h2 --mv u --json
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
   vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
@@ -47,6 +52,10 @@ pub struct Cli {
 pub enum Command {
     /// Run a scenario on a simulated rig and write its signals.
     Simulate(simulate::Arguments),
+    /// Linearise a rig at rest: state space, poles, zeros, transfer functions, gains, low-order models.
+    Model(model::Arguments),
+    /// Run models side by side on one input, against a recording.
+    Compare(compare::Arguments),
     /// Fit a process model to a log.
     Identify(identify::Arguments),
     /// Tune a controller for a model by published rules.
@@ -137,6 +146,8 @@ pub fn run(cli: Cli) -> CliOutcome {
     let Some(command) = cli.command else { return CliOutcome::OpenWindow(cli.file) };
     let answered = match &command {
         Command::Simulate(arguments) => simulate::run(arguments),
+        Command::Model(arguments) => model::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Analyze(arguments) => analyze::run(arguments),

@@ -18,6 +18,8 @@ pub struct InputSeries {
     pub time_s: Vec<f64>,
     /// One column of N values a pump, in its unit; each holds from its stamp until the next.
     pub inputs: Vec<Vec<f64>>,
+    /// One column of N angles in degrees a valve, which the non-linear model follows; empty: they stay as at the start.
+    pub angles_deg: Vec<Vec<f64>>,
     /// Levels in cm and inputs before the first stamp, the streams in the air in equilibrium with them.
     pub start: OperatingPoint,
 }
@@ -155,6 +157,19 @@ impl Comparison {
         if let Some(column) = series.inputs.iter().find(|c| c.len() != series.time_s.len()) {
             return Err(shape(network.pumps.len(), column.len()).into());
         }
+        let valves = (network.valves.len(), series.time_s.len());
+        if !series.angles_deg.is_empty()
+            && (series.angles_deg.len() != valves.0 || series.angles_deg.iter().any(|c| c.len() != valves.1))
+        {
+            return Err(StateSpaceError::Shape {
+                what: "α",
+                rows: series.angles_deg.first().map_or(0, Vec::len),
+                columns: series.angles_deg.len(),
+                expected_rows: valves.1,
+                expected_columns: valves.0,
+            }
+            .into());
+        }
         if series.time_s.is_empty() {
             return Err(shape(0, 0).into());
         }
@@ -223,6 +238,9 @@ impl Comparison {
             out.push(plant.levels_cm()[self.tank]);
             for (pump, column) in self.series.inputs.iter().enumerate() {
                 plant.set_input(pump, column[k])?;
+            }
+            for (valve, column) in self.series.angles_deg.iter().enumerate() {
+                plant.set_angle(valve, column[k])?;
             }
             if let Some(&next) = self.series.time_s.get(k + 1) {
                 if next <= t {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::closed_loop::ClosedLoop;
 use crate::explain::{Explain, number};
-use crate::plant::{Measurement, Network, RigError};
+use crate::plant::{Measurement, Network, OperatingPoint, RigError};
 use crate::session::{CommandError, RigCommand};
 use crate::signal::ChannelSet;
 
@@ -223,6 +223,23 @@ pub(super) fn run_samples(
         see(sample, now_s, closed.step());
     }
     Ok(())
+}
+
+/// Where a scenario starts: levels, inputs, angles and delays before its first sample, and its configuration's index.
+///
+/// # Errors
+/// [`ScenarioError`] when the start is refused.
+pub fn scenario_start(
+    network: Arc<Network>,
+    scenario: &Scenario,
+) -> Result<(OperatingPoint, usize), ScenarioError> {
+    let refused = |error: CommandError| ScenarioError::Command { at_s: 0.0, error };
+    let configuration = configuration_index(&network, scenario).map_err(refused)?;
+    let mut closed = ClosedLoop::simulated(network, configuration, scenario.measurement, scenario.seed)
+        .map_err(refused)?;
+    set_start(&mut closed, &scenario.start).map_err(refused)?;
+    let plant = closed.source().plant().ok_or_else(|| refused(CommandError::NotARig))?;
+    Ok((OperatingPoint::of(plant), configuration))
 }
 
 fn configuration_index(network: &Network, scenario: &Scenario) -> Result<usize, CommandError> {
