@@ -38,7 +38,7 @@ pub fn at_rest(
             let p = &network.pumps[pump];
             in_range(tag, "input", value, p.min, p.max)?;
             point.inputs[pump] = value;
-            for (level, l) in held.iter_mut().zip(loops).filter(|(_, l)| l.pump == tag) {
+            for (level, l) in held.iter_mut().zip(loops).filter(|(_, l)| l.pump.as_deref() == Some(tag)) {
                 let given = at.iter().any(|other| other.starts_with(&format!("{}=", l.id)));
                 if given {
                     return Err(Refusal(format!("{tag} and {} are both given, but {tag} is its pump", l.id)));
@@ -57,7 +57,7 @@ pub fn at_rest(
         }
     }
     let target = |(l, level): (&vasos_engine::control::LoopSpec, &Option<f64>)| {
-        let (pump, sensor) = (network.pump(&l.pump)?, network.sensor(&l.sensor)?);
+        let (pump, sensor) = (network.pump(l.pump.as_deref()?)?, network.sensor(&l.sensor)?);
         Some(SteadyTarget { pump, tank: network.sensors[sensor].tank, level_cm: (*level)? })
     };
     let targets: Vec<SteadyTarget> = loops.iter().zip(&held).filter_map(target).collect();
