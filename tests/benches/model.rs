@@ -11,7 +11,7 @@ use vasos_io::rig::preset;
 fn targets(network: &Network, configuration: usize) -> Vec<SteadyTarget> {
     let loops = &network.spec.configurations[configuration].loops;
     let target = |l: &vasos_engine::control::LoopSpec| SteadyTarget {
-        pump: network.pump(&l.pump).expect("a pump"),
+        pump: l.pump.as_deref().and_then(|p| network.pump(p)).expect("a pump"),
         tank: network.sensors[network.sensor(&l.sensor).expect("a sensor")].tank,
         level_cm: l.setpoint_cm,
     };
