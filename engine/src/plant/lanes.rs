@@ -85,8 +85,20 @@ pub(crate) struct Pack<const L: usize>(pub [f64; L]);
 
 impl<const L: usize> Pack<L> {
     #[inline(always)]
-    fn each(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    fn each(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        // A plain loop: `array::from_fn` is not always taken apart into vector instructions.
+        for i in 0..L {
+            self.0[i] = f(self.0[i], other.0[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn all(mut self, f: impl Fn(f64) -> f64) -> Self {
+        for x in &mut self.0 {
+            *x = f(*x);
+        }
+        self
     }
 }
 
@@ -126,7 +138,7 @@ impl<const L: usize> Mul<f64> for Pack<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
-        Self(self.0.map(|x| x * factor))
+        self.all(|x| x * factor)
     }
 }
 
@@ -134,7 +146,7 @@ impl<const L: usize> Neg for Pack<L> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|x| -x))
+        self.all(|x| -x)
     }
 }
 
@@ -172,21 +184,29 @@ impl<const L: usize> Number for Pack<L> {
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
+        self.all(f64::sqrt)
     }
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        Self(self.0.map(|x| x.max(least)))
+        self.all(|x| x.max(least))
     }
 
     #[inline(always)]
     fn smallest(self) -> f64 {
-        self.0.iter().fold(f64::INFINITY, |least, &x| least.min(x.smallest()))
+        let mut least = f64::INFINITY;
+        for x in self.0 {
+            least = least.min(x.smallest());
+        }
+        least
     }
 
     #[inline(always)]
     fn largest(self) -> f64 {
-        self.0.iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
+        let mut most = f64::NEG_INFINITY;
+        for x in self.0 {
+            most = most.max(x);
+        }
+        most
     }
 }

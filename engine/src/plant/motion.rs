@@ -99,6 +99,16 @@ impl Hermite {
     }
 }
 
+/// An array over nodes. A plain loop: `array::from_fn` is not always taken apart into vector instructions.
+#[inline(always)]
+fn nodes<const N: usize, V: Number>(node: impl Fn(usize) -> V) -> [V; N] {
+    let mut made = [V::of(0.0); N];
+    for (i, made) in made.iter_mut().enumerate() {
+        *made = node(i);
+    }
+    made
+}
+
 impl<const N: usize, V: Number> Motion<N, V> {
     /// A rig at rest with everything empty; `areas_cm2` of the tanks, `coefficients` of the valves.
     pub fn new(network: &Network, areas_cm2: &[V], coefficients: &[V], pipes: Vec<Pipe<V>>) -> Self {
@@ -229,7 +239,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
             return false;
         }
         self.evaluate_end();
-        self.end_slope = std::array::from_fn(|i| self.end_net[i] + self.inflow[i]);
+        self.end_slope = nodes(|i| self.end_net[i] + self.inflow[i]);
         (self.length_s, self.passed_s) = (step_s, 0.0);
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
             if !self.look_ahead {
@@ -245,7 +255,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
     pub(super) fn prepare_step(&mut self) {
         self.set_inflow();
         (self.start, self.start_flow) = (self.end, self.end_flow);
-        self.start_slope = std::array::from_fn(|i| self.end_net[i] + self.inflow[i]);
+        self.start_slope = nodes(|i| self.end_net[i] + self.inflow[i]);
     }
 
     /// Length of a step of at most `most_s` that resolves every stream from `start`.
@@ -275,14 +285,15 @@ impl<const N: usize, V: Number> Motion<N, V> {
         self.volume = self.start_flow;
         let mut slope = self.start_slope;
         for (share, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            let stage: [V; N] = std::array::from_fn(|i| self.start[i] + slope[i] * (share * h));
+            let stage: [V; N] = nodes(|i| self.start[i] + slope[i] * (share * h));
             slope = self.streams.evaluate::<GUARD>(&stage, &self.inflow, weight, &mut self.volume);
             if GUARD {
                 self.hold_at_rims(&stage, &mut slope);
             }
         }
-        self.volume = self.volume.map(|sum| sum * (h / 6.0));
-        self.end = std::array::from_fn(|i| self.start[i] + self.inflow[i] * h);
+        let volume = self.volume;
+        self.volume = nodes(|i| volume[i] * (h / 6.0));
+        self.end = nodes(|i| self.start[i] + self.inflow[i] * h);
         self.streams.move_volumes(&self.volume, &mut self.end);
     }
 
@@ -353,7 +364,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
             return self.end;
         }
         let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
-        std::array::from_fn(|i| self.between(w, i))
+        nodes(|i| self.between(w, i))
     }
 
     #[inline(always)]

@@ -48,6 +48,15 @@ struct Stream<V> {
     slot: usize,
 }
 
+impl<V: Number> Stream<V> {
+    #[inline(always)]
+    fn head<const N: usize, const GUARD: bool>(&self, levels: &[V; N]) -> V {
+        // Nodes and streams are below N; the mask says so to the compiler.
+        let head = levels[self.from & (N - 1)] - levels[self.against & (N - 1)];
+        if GUARD { head.at_least(self.least) } else { head }
+    }
+}
+
 /// Every stream that is not shut.
 #[derive(Debug, Clone)]
 pub(crate) struct Streams<const N: usize, V> {
@@ -179,20 +188,22 @@ impl<const N: usize, V: Number> Streams<N, V> {
         let mut slope = *base;
         // Two at a time: half as many vector roots. Padding closes an odd number.
         for (pair, columns) in self.streams.as_chunks::<2>().0.iter().zip(self.columns.as_chunks::<2>().0) {
-            let head = pair.each_ref().map(|s| levels[s.from & (N - 1)] - levels[s.against & (N - 1)]);
-            let head = if GUARD { [0, 1].map(|i| head[i].at_least(pair[i].least)) } else { head };
-            let r = head.map(|h| h * h + V::of(self.delta2)).map(V::sqrt).map(V::sqrt);
-            let through = [0, 1].map(|i| pair[i].k * head[i]);
-            let flow = [0, 1].map(|i| through[i] / r[i]);
-            let flow = if pair[1].linear {
-                [0, 1].map(|i| if pair[i].linear { through[i] } else { flow[i] })
-            } else {
-                flow
-            };
-            for i in [0, 1] {
-                sum[pair[i].slot & (N - 1)] += flow[i] * weight;
-                self.add(&pair[i], &columns[i], flow[i], &mut slope);
+            let [one, two] = pair;
+            let (h1, h2) = (one.head::<N, GUARD>(levels), two.head::<N, GUARD>(levels));
+            let delta2 = V::of(self.delta2);
+            let (r1, r2) = ((h1 * h1 + delta2).sqrt().sqrt(), (h2 * h2 + delta2).sqrt().sqrt());
+            let (q1, q2) = (one.k * h1, two.k * h2);
+            let (mut f1, mut f2) = (q1 / r1, q2 / r2);
+            if two.linear {
+                f2 = q2;
+                f1 = if one.linear { q1 } else { f1 };
+            } else if one.linear {
+                f1 = q1;
             }
+            sum[one.slot & (N - 1)] += f1 * weight;
+            sum[two.slot & (N - 1)] += f2 * weight;
+            self.add(one, &columns[0], f1, &mut slope);
+            self.add(two, &columns[1], f2, &mut slope);
         }
         slope
     }

@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use super::closed_loop::ClosedLoop;
-use super::flock::{Flock, can_flock};
+use super::flock::{PLANTS, can_flock, run_flock};
 use super::scenario::{Prepared, Scenario, ScenarioError, prepare, run_samples};
 use crate::plant::{Measurement, Network, RigError};
 use crate::signal::ChannelKind;
@@ -157,9 +157,9 @@ pub fn run_ensemble(
     let (mut watches, mut in_lanes) = (Vec::with_capacity(count), 0);
     while watches.len() < count {
         let first = watches.len();
-        let group = (first..count.min(first + Flock::PLANTS)).map(member).collect::<Result<Vec<_>, _>>()?;
-        let together = if lanes && group.len() == Flock::PLANTS {
-            Flock::new(&prepared.closed, &group, scenario.measurement).run(&prepared.events, prepared.samples)
+        let group = (first..count.min(first + PLANTS)).map(member).collect::<Result<Vec<_>, _>>()?;
+        let together = if lanes && group.len() == PLANTS {
+            run_flock(&prepared.closed, &group, scenario.measurement, &prepared.events, prepared.samples)
         } else {
             None
         };

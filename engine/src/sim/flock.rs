@@ -17,7 +17,7 @@ use crate::plant::{
 use crate::session::RigCommand;
 
 /// Plants of a flock.
-const PLANTS: usize = 8;
+pub(super) const PLANTS: usize = 4;
 /// Longest arrays the lanes are made for; larger rigs run one by one.
 const LONGEST: usize = 16;
 
@@ -42,6 +42,22 @@ pub(super) fn can_flock(closed: &ClosedLoop, events: &[ScenarioEvent]) -> bool {
         && events.iter().all(|e| simple(&e.command))
 }
 
+/// Runs as many plants as [`PLANTS`] from the state of `start`; `None` when a tank came to its rim or ran empty, or a
+/// command was refused.
+pub(super) fn run_flock(
+    start: &ClosedLoop,
+    rigs: &[(Arc<Network>, u64)],
+    measurement: Measurement,
+    events: &[ScenarioEvent],
+    samples: u64,
+) -> Option<Vec<Watch>> {
+    if widest(start.network()) <= 8 {
+        Flock::<8>::new(start, rigs, measurement).run(events, samples)
+    } else {
+        Flock::<LONGEST>::new(start, rigs, measurement).run(events, samples)
+    }
+}
+
 struct Member {
     network: Arc<Network>,
     transmitters: Vec<Transmitter>,
@@ -55,8 +71,8 @@ struct Member {
 }
 
 /// Plants that share a step.
-pub(super) struct Flock {
-    motion: Motion<LONGEST, Lanes>,
+struct Flock<const N: usize> {
+    motion: Motion<N, Lanes>,
     members: Vec<Member>,
     /// Sensor and pump of each loop.
     wiring: Vec<(usize, usize)>,
@@ -67,12 +83,9 @@ pub(super) struct Flock {
     sample_time_s: f64,
 }
 
-impl Flock {
-    /// How many plants.
-    pub const PLANTS: usize = PLANTS;
-
+impl<const N: usize> Flock<N> {
     /// Plants of these rigs and seeds, in the state of `start`.
-    pub fn new(start: &ClosedLoop, rigs: &[(Arc<Network>, u64)], measurement: Measurement) -> Self {
+    fn new(start: &ClosedLoop, rigs: &[(Arc<Network>, u64)], measurement: Measurement) -> Self {
         let network = start.network();
         let angles = start.source().plant().map_or(&[][..], |p| p.angles_deg());
         let levels = start.source().plant().map_or(&[][..], |p| p.levels_cm());
@@ -106,7 +119,7 @@ impl Flock {
     }
 
     /// Runs all samples; `None` when a tank came to its rim or ran empty, or a command was refused.
-    pub fn run(mut self, events: &[ScenarioEvent], samples: u64) -> Option<Vec<Watch>> {
+    fn run(mut self, events: &[ScenarioEvent], samples: u64) -> Option<Vec<Watch>> {
         for member in &mut self.members {
             member.watch = Watch::new(samples, self.sample_time_s);
         }
