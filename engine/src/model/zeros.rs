@@ -60,7 +60,9 @@ impl System {
                 return Self { a, b, c, d };
             }
             d = (&rotate * d).rows(0, rank).into_owned();
-            let rotated = rotate * c;
+            let mut rotated = rotate * c;
+            // What counts as nothing has to be nothing: turned towards a small coupling it would grow with every step.
+            rotated.iter_mut().filter(|v| v.abs() <= tolerance).for_each(|v| *v = 0.0);
             let (kept, lower) =
                 (rotated.rows(0, rank).into_owned(), rotated.rows(rank, outputs - rank).into_owned());
             // Columns that the outputs without feedthrough show come first.
