@@ -1,6 +1,7 @@
 //! The living P&ID: model, layout, paint, and what the pointer does.
 
-pub mod layout;
+pub mod faults;
+mod layout;
 pub mod model;
 mod paint;
 
@@ -8,11 +9,11 @@ use std::sync::Arc;
 
 use eframe::egui::{self, Id, Rect, Role, Sense, WidgetInfo, vec2};
 use vasos_engine::document::DocumentCommand;
-use vasos_engine::plant::Network;
+use vasos_engine::plant::{FaultyPart, Network};
 use vasos_engine::session::RigCommand;
 
 use self::layout::Layout;
-use self::model::{PidModel, PumpView, TankView, ValveView};
+use self::model::{BubbleView, PidModel, PumpView, TankView, ValveView};
 use crate::action::Action;
 use crate::panes::View;
 use crate::{text, theme, tr};
@@ -76,6 +77,11 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     for (i, pump) in model.pumps.iter().enumerate() {
         pump_ui(ui, view, i, pump, model.scale, &mut actions);
     }
+    for bubble in model.bubbles.iter().filter(|b| b.automatic.is_none()) {
+        sensor_ui(ui, view, bubble, model.scale, &mut actions);
+    }
+    paint::faults(ui.painter(), &model, &p);
+    rig_ui(ui, view, rect, &mut actions);
     paint::hint(ui.painter(), rect, &tr!("pid.hint"), &p);
     actions
 }
@@ -149,6 +155,7 @@ fn valve_ui(
             }
         });
     });
+    faults::menu(&response, view.snapshot, &valve.tag, actions);
     response.on_hover_text(tr!("pid.valve_hint"));
 }
 
@@ -177,11 +184,45 @@ fn tank_popup(ui: &mut egui::Ui, view: &View, index: usize, tank: &TankView, act
             }
         });
     });
+    faults::menu(&response, view.snapshot, &tank.tag, actions);
     if response.hovered() {
         let p = theme::palette(ui);
         let line = egui::Stroke::new(1.5, p.accent_text);
         ui.painter().rect_stroke(tank.rect.expand(2.0), 3.0, line, egui::StrokeKind::Outside);
     }
+}
+
+fn sensor_ui(ui: &mut egui::Ui, view: &View, bubble: &BubbleView, scale: f32, actions: &mut Vec<Action>) {
+    let rect = Rect::from_center_size(bubble.at, egui::Vec2::splat(2.0 * paint::bubble_radius(scale)));
+    let response = ui.interact(rect, Id::unique(("sensor", &bubble.tag)), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, tr!("pid.sensor", tag = bubble.tag)));
+    faults::menu(&response, view.snapshot, &bubble.tag, actions);
+    // A sensor has nothing else to set: the left button opens the same menu.
+    if let Some(part) = FaultyPart::find(&view.snapshot.network, &bubble.tag) {
+        egui::Popup::menu(&response)
+            .id(response.id.with("left"))
+            .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+            .show(|ui| faults::switches(ui, view.snapshot, &bubble.tag, part, actions));
+    }
+    response.on_hover_text(tr!("pid.sensor_hint"));
+}
+
+/// Power, faults and water of the whole rig, in the corner of the drawing.
+fn rig_ui(ui: &mut egui::Ui, view: &View, rect: Rect, actions: &mut Vec<Action>) {
+    let count = view.snapshot.faults.len();
+    let words = if count == 0 { tr!("pid.rig") } else { tr!("pid.rig_faults", count = count) };
+    let galley = ui.painter().layout_no_wrap(
+        words.clone(),
+        egui::FontId::proportional(theme::SMALL),
+        egui::Color32::WHITE,
+    );
+    let size = galley.size() + vec2(14.0, 6.0);
+    let at = Rect::from_min_size(rect.right_bottom() - size, size);
+    let button = egui::Button::new(egui::RichText::new(words).size(theme::SMALL));
+    let response = ui.put(at, button).on_hover_text(tr!("pid.rig_hint"));
+    egui::Popup::menu(&response)
+        .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+        .show(|ui| faults::overview(ui, view.snapshot, actions));
 }
 
 fn pump_ui(
@@ -215,4 +256,5 @@ fn pump_ui(
         }
         ui.weak(format!("{}…{} {}", text::brief(range.min), text::brief(range.max), pump.unit));
     });
+    faults::menu(&response, view.snapshot, &pump.tag, actions);
 }

@@ -1,7 +1,7 @@
 //! What the P&ID shows: the snapshot laid out, ready to paint and to test.
 
 use eframe::egui::{Pos2, Rect, pos2, vec2};
-use vasos_engine::plant::ReadingStatus;
+use vasos_engine::plant::{FaultKind, FaultyPart, ReadingStatus};
 use vasos_engine::session::{Alarm, Snapshot};
 
 use super::layout::{Frame, Layout, Route};
@@ -24,6 +24,10 @@ pub struct TankView {
     pub surface_y: f32,
     /// Spill in cm³/s.
     pub spill_cm3_s: f64,
+    /// Leak to the floor in cm³/s.
+    pub leak_cm3_s: f64,
+    /// Where the leak falls: from the floor of the tank down.
+    pub leak: [Pos2; 2],
     /// Where the spill falls: from the rim down.
     pub spill: [Pos2; 2],
     /// A stream falls in where the reading would stand.
@@ -131,6 +135,8 @@ pub struct PidModel {
     pub taps: Vec<[Pos2; 2]>,
     /// Signal lines of the loops in operation.
     pub signals: Vec<Vec<Pos2>>,
+    /// Faults: where a badge stands, and what it says.
+    pub faults: Vec<(Pos2, FaultKind)>,
     /// Pixels per grid unit.
     pub scale: f32,
 }
@@ -191,7 +197,27 @@ impl PidModel {
         let taps = taps
             .map(|(at, s)| [pos2(layout.tanks[s.tank].right(), at.y), *at].map(|q| frame.point(q)))
             .collect();
-        Self { tanks, valves, pumps, bubbles, taps, signals, scale: frame.scale() }
+        let mut made =
+            Self { tanks, valves, pumps, bubbles, taps, signals, faults: vec![], scale: frame.scale() };
+        made.place_faults(snapshot, rect);
+        made
+    }
+
+    /// A badge at every part that is broken; several of one part stand below each other.
+    fn place_faults(&mut self, snapshot: &Snapshot, rect: Rect) {
+        let mut taken: Vec<&str> = vec![];
+        for active in &snapshot.faults {
+            let at = match FaultyPart::find(&snapshot.network, &active.tag) {
+                Some(FaultyPart::Sensor(i)) => self.bubbles[i].at + vec2(0.0, 0.27 * self.scale.min(100.0)),
+                Some(FaultyPart::Valve(i)) => self.valves[i].at + vec2(0.0, -0.24 * self.scale.min(100.0)),
+                Some(FaultyPart::Tank(i)) => self.tanks[i].rect.center_bottom() - vec2(0.0, 14.0),
+                Some(FaultyPart::Pump(i)) => self.pumps[i].at + vec2(0.0, 0.27 * self.scale.min(100.0)),
+                Some(FaultyPart::Rig) | None => rect.center_top() + vec2(0.0, 10.0),
+            };
+            let below = taken.iter().filter(|tag| **tag == active.tag).count() as f32 * 18.0;
+            taken.push(&active.tag);
+            self.faults.push((at + vec2(0.0, below), active.fault.kind()));
+        }
     }
 }
 
@@ -215,6 +241,8 @@ fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankVi
         level_cm: now.level_cm,
         height_cm,
         spill_cm3_s: now.spill_cm3_s,
+        leak_cm3_s: now.leak_cm3_s,
+        leak: [0.0, 13.0].map(|down| pos2(rect.left() + 0.22 * rect.width(), rect.bottom() + down)),
         spill: [pos2(x, rect.top()), pos2(x, bottom)],
         fed_on_the_right: snapshot.network.pumps.iter().any(|p| p.from.is_none() && p.to == i),
         setpoint_cm: held.map(|l| l.setpoint_cm),

@@ -4,7 +4,7 @@ use eframe::egui::{self, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, St
 
 use super::model::{BubbleView, PidModel, PumpView, StreamView, TankView, ValveView};
 use crate::theme::{self, Palette};
-use crate::{text, tr};
+use crate::{journal, text, tr};
 
 /// Length of a moving dash and of the gap behind it, in points.
 const DASH: f32 = 7.0;
@@ -152,11 +152,22 @@ fn tank(painter: &Painter, view: &TankView, p: &Palette, phase: f32) {
         let points = vec![pos2(x - 1.0, y), pos2(x - 9.0, y - 5.0), pos2(x - 9.0, y + 5.0)];
         painter.add(Shape::convex_polygon(points, p.sp, Stroke::new(1.0, p.pane)));
     }
+    if view.leak_cm3_s > 0.0 {
+        painter.line_segment(view.leak, Stroke::new(3.0, p.water));
+        dashes(painter, &view.leak, 2.0, p.stream, phase);
+    }
     if view.spill_cm3_s > 0.0 {
         painter.line_segment(view.spill, Stroke::new(4.0, p.water));
         dashes(painter, &view.spill, 2.5, p.stream, phase);
         let spilled = format!("{} {} cm³/s", tr!("pid.overflow"), text::fixed(view.spill_cm3_s, 1));
         badge(painter, view.rect.center_top() + vec2(0.0, 30.0), &spilled, p);
+    }
+}
+
+/// A badge at everything that is broken.
+pub fn faults(painter: &Painter, model: &PidModel, p: &Palette) {
+    for (at, kind) in &model.faults {
+        badge(painter, *at, &journal::fault_name(*kind), p);
     }
 }
 
