@@ -1,7 +1,7 @@
 //! The faceplate of a loop: PV, SP and MV on bars, mode, keys, tuning in use, alarms.
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Role, Sense, Stroke, WidgetInfo, pos2, vec2};
-use vasos_engine::control::Mode;
+use vasos_engine::control::{Action as Direction, AntiWindup, Clip, Form, FormGains, Law, Mode, Sends};
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{LoopNow, RigCommand};
 use vasos_engine::sim::LoopTarget;
@@ -9,7 +9,7 @@ use vasos_engine::sim::LoopTarget;
 use crate::action::Action;
 use crate::panes::View;
 use crate::widgets::segmented;
-use crate::{text, theme, tr};
+use crate::{i18n, text, theme, tr};
 
 /// State of the pane.
 #[derive(Default)]
@@ -52,11 +52,14 @@ fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, act
         } else {
             ui.label(egui::RichText::new(&now.tag).family(theme::bold()).size(15.0));
         }
-        let modes = [tr!("mode.man"), tr!("mode.auto")];
-        let chosen = usize::from(now.mode.is_controlling());
-        if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &modes, chosen) {
-            let mode = if chosen == 1 { Mode::Automatic } else { Mode::Manual };
-            actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), mode)));
+        let mut modes = vec![(tr!("mode.man"), Mode::Manual), (tr!("mode.auto"), Mode::Automatic)];
+        if now.outer.is_some() {
+            modes.push((tr!("mode.cas"), Mode::Cascade));
+        }
+        let chosen = modes.iter().position(|(_, m)| *m == now.mode).unwrap_or(0);
+        let names: Vec<String> = modes.iter().map(|(name, _)| name.clone()).collect();
+        if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &names, chosen) {
+            actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), modes[chosen].1)));
         }
     });
 }
@@ -171,11 +174,95 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
     });
 }
 
+/// The law with its choice, its direction, and what is on around it.
+fn law(ui: &mut egui::Ui, now: &LoopNow, actions: &mut Vec<Action>) {
+    let direction = match now.action {
+        Direction::Reverse => tr!("faceplate.reverse"),
+        Direction::Direct => tr!("faceplate.direct"),
+    };
+    let name = law_name(&now.law);
+    ui.horizontal(|ui| {
+        let combo =
+            egui::ComboBox::from_id_salt("law").width(84.0).selected_text(egui::RichText::new(&name).small());
+        let combo = combo.show_ui(ui, |ui| {
+            let laws = [
+                Law::default(),
+                Law::PidI2gl { clip: Clip::Integral, sends: Sends::Position },
+                Law::Pid2gl { bias: None, anti_windup: AntiWindup::Clamping },
+                Law::Pid2gl { bias: None, anti_windup: AntiWindup::BackCalculation { tracking_s: None } },
+                Law::OnOff { gap_cm: 0.5, action: now.action },
+            ];
+            for law in laws {
+                if ui.selectable_label(now.law == law, law_name(&law)).clicked() && now.law != law {
+                    actions.push(Action::Document(DocumentCommand::Law(now.tag.clone(), law)));
+                }
+            }
+        });
+        combo.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, tr!("faceplate.law")));
+        combo.response.on_hover_text(parts(now));
+        ui.label(egui::RichText::new(direction).small());
+    });
+    if let Law::OnOff { mut gap_cm, action } = now.law {
+        ui.horizontal(|ui| {
+            let name = ui.label(tr!("faceplate.gap"));
+            let field = egui::DragValue::new(&mut gap_cm).range(0.0..=10.0).speed(0.01).suffix(" cm");
+            if ui.add(field).labelled_by(name.id).changed() {
+                let law = Law::OnOff { gap_cm, action };
+                actions.push(Action::Document(DocumentCommand::Law(now.tag.clone(), law)));
+            }
+        });
+    }
+}
+
+fn law_name(law: &Law) -> String {
+    match law {
+        Law::PidI2gl { clip: Clip::Output, .. } => "PID-I2GL".to_owned(),
+        Law::PidI2gl { clip: Clip::Integral, .. } => tr!("law.i2gl_integral"),
+        Law::Pid2gl { anti_windup: AntiWindup::Clamping, .. } => "PID-2GL".to_owned(),
+        Law::Pid2gl { anti_windup: AntiWindup::BackCalculation { .. }, .. } => tr!("law.pid_2gl_back"),
+        Law::OnOff { .. } => tr!("law.on_off"),
+    }
+}
+
+/// What the law came to in the last sample, and the gains in the other forms.
+fn parts(now: &LoopNow) -> String {
+    let last = now.last.parts;
+    let number = |v: f64| text::fixed(v, 5);
+    let mut words = tr!("faceplate.parts", p = number(last.p), i = number(last.i), d = number(last.d));
+    let gains = FormGains::Ideal(now.tuning_now.gains);
+    for form in [Form::Parallel, Form::Series] {
+        words.push('\n');
+        words.push_str(&match gains.to_form(form) {
+            Ok(FormGains::Parallel(g)) => {
+                tr!(
+                    "faceplate.parallel",
+                    kp = text::brief(g.kp),
+                    ki = text::brief(g.ki),
+                    kd = text::brief(g.kd)
+                )
+            }
+            Ok(FormGains::Series(g)) => {
+                tr!(
+                    "faceplate.series",
+                    kc = text::brief(g.kc),
+                    ti = text::brief(g.ti_s),
+                    td = text::brief(g.td_s)
+                )
+            }
+            Ok(FormGains::Ideal(_)) => String::new(),
+            Err(error) => i18n::say(&error),
+        });
+    }
+    words
+}
+
 fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
     let Some(settings) = view.document.rig.loops.get(&now.tag) else { return };
     let unit = mv_unit(view, now);
-    let action = if now.tuning.gains.kc > 0.0 { tr!("faceplate.reverse") } else { tr!("faceplate.direct") };
-    ui.label(egui::RichText::new(format!("PID-I2GL · {action}")).small());
+    law(ui, now, actions);
+    if !settings.law.is_pid() {
+        return;
+    }
     let gains = settings.tuning.gains;
     let mut edited = settings.tuning;
     let mut filter_s = settings.pv_filter_s;

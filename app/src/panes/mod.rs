@@ -2,6 +2,7 @@
 
 pub mod faceplate;
 pub mod identify;
+pub mod linear;
 pub mod log;
 pub mod nyquist;
 pub mod pid;
@@ -32,6 +33,8 @@ pub enum PaneKind {
     Trend,
     /// Data to model.
     Identify,
+    /// The rig as a linear model.
+    Linear,
     /// Model to gains.
     Tune,
     /// The loop's curve.
@@ -44,11 +47,12 @@ pub enum PaneKind {
 
 impl PaneKind {
     /// Every pane.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Pid,
         Self::Faceplate,
         Self::Trend,
         Self::Identify,
+        Self::Linear,
         Self::Tune,
         Self::Nyquist,
         Self::Step,
@@ -63,6 +67,7 @@ impl PaneKind {
             Self::Faceplate => "pane.faceplate",
             Self::Trend => "pane.trend",
             Self::Identify => "pane.identify",
+            Self::Linear => "pane.linear",
             Self::Tune => "pane.tune",
             Self::Nyquist => "pane.nyquist",
             Self::Step => "pane.step",
@@ -104,6 +109,8 @@ pub struct States {
     pub trend: trend::State,
     /// Of identification.
     pub identify: identify::State,
+    /// Of linear models.
+    pub linear: linear::State,
     /// Of tuning.
     pub tune: tune::State,
     /// Of the Nyquist plot.
@@ -121,6 +128,7 @@ pub fn ui(kind: PaneKind, ui: &mut egui::Ui, view: &View, states: &mut States) -
         PaneKind::Faceplate => faceplate::ui(ui, view, &mut states.faceplate),
         PaneKind::Trend => trend::ui(ui, view, &mut states.trend),
         PaneKind::Identify => identify::ui(ui, view, &mut states.identify),
+        PaneKind::Linear => linear::ui(ui, view, &mut states.linear),
         PaneKind::Tune => tune::ui(ui, view, &mut states.tune),
         PaneKind::Nyquist => nyquist::ui(ui, view, &mut states.nyquist),
         PaneKind::Step => step::ui(ui, view, &mut states.step),

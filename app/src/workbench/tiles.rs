@@ -20,7 +20,7 @@ pub fn first_layout() -> Tree<PaneKind> {
     let above: Vec<TileId> =
         [PaneKind::Pid, PaneKind::Faceplate, PaneKind::Trend].map(|p| tab(&mut tiles, &[p])).into();
     let below: Vec<TileId> = vec![
-        tab(&mut tiles, &[PaneKind::Identify]),
+        tab(&mut tiles, &[PaneKind::Identify, PaneKind::Linear]),
         tab(&mut tiles, &[PaneKind::Tune]),
         tab(&mut tiles, &[PaneKind::Nyquist]),
         tab(&mut tiles, &[PaneKind::Step, PaneKind::Log]),
