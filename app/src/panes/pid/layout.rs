@@ -104,28 +104,17 @@ impl Layout {
             .iter()
             .map(|s| pos2(tanks[s.tank].right() + 0.36, tanks[s.tank].center().y))
             .collect();
-        let controllers = network
-            .pumps
-            .iter()
-            .zip(&pumps)
-            .map(|(pump, at)| match pump.from {
-                Some(_) => {
-                    let x = if at.x < all.left() { at.x + 0.36 } else { at.x - 0.36 };
-                    let free = |p: &Pos2| sensors.iter().all(|s| (*s - *p).length() > 0.35);
-                    let place = |up: f32| pos2(x, at.y - up);
-                    [1.0, 0.55, 1.5].map(place).into_iter().find(free).unwrap_or(place(1.0))
-                }
-                None => pos2(tanks[pump.to].right() + 0.36, tanks[pump.to].center().y - 0.48),
-            })
-            .collect();
+        let controllers = controllers(network, &tanks, &pumps, &sensors, all);
         let mut bounds = all;
         let lanes = drawing.len().saturating_sub(1) as f32;
         bounds.extend_with(pos2(all.left() - 0.16, top - LANE * lanes - 0.2));
         for point in pumps.iter().chain(&sensors) {
             bounds.extend_with(*point + vec2(0.28, 0.2));
         }
-        for point in pumps.iter().filter(|at| at.x < all.left()) {
+        for point in pumps.iter().filter(|at| at.x < all.left() && at.y > top) {
             bounds.extend_with(*point - vec2(0.28, 0.2));
+            // Room for tag and input above the hint.
+            bounds.extend_with(*point + vec2(0.0, 0.42));
         }
         for place in valves.iter_mut().filter(|v| !v.vertical) {
             let above = |s: &Pos2| (s.x - place.at.x).abs() < 0.5 && (0.0..0.5).contains(&(place.at.y - s.y));
@@ -156,6 +145,24 @@ impl Layout {
             controllers,
         }
     }
+}
+
+/// Where the controller of each pump stands: clear of the sensors.
+fn controllers(network: &Network, tanks: &[Rect], pumps: &[Pos2], sensors: &[Pos2], all: Rect) -> Vec<Pos2> {
+    network
+        .pumps
+        .iter()
+        .zip(pumps)
+        .map(|(pump, at)| match pump.from {
+            Some(_) => {
+                let x = if at.x < all.left() { at.x + 0.36 } else { at.x - 0.36 };
+                let free = |p: &Pos2| sensors.iter().all(|s| (*s - *p).length() > 0.35);
+                let place = |up: f32| pos2(x, at.y - up);
+                [1.0, 0.55, 1.5].map(place).into_iter().find(free).unwrap_or(place(1.0))
+            }
+            None => pos2(tanks[pump.to].right() + 0.36, tanks[pump.to].center().y - 0.48),
+        })
+        .collect()
 }
 
 fn valve(valve: &vasos_engine::plant::Valve, tanks: &[Rect]) -> (ValvePlace, Route) {
@@ -225,15 +232,17 @@ fn pump_place(
 fn delivery(at: Pos2, from_below: bool, tank: usize, tanks: &[Rect], run: f32) -> Route {
     let target = tanks[tank];
     let (x, y) = if is_covered(tank, tanks) {
-        let side = if at.x < target.center().x { target.left() + 0.14 } else { target.right() - 0.14 };
-        (side, target.top() - 0.12)
+        // Clear of the tag on the left; on the right the reading makes room.
+        let x = if at.x < target.center().x { target.left() + 0.46 } else { target.right() - 0.1 };
+        (x, target.top() - 0.07)
     } else if from_below {
         (target.center().x, run)
     } else {
         // Off the middle, where the readings leave room.
         (target.center().x + 0.22, run)
     };
-    let mut pipe = vec![at, pos2(at.x, y), pos2(x, y), pos2(x, target.top() - 0.06)];
+    let end_y = (target.top() - 0.06).max(y + 0.04);
+    let mut pipe = vec![at, pos2(at.x, y), pos2(x, y), pos2(x, end_y)];
     if at.y == y {
         pipe.remove(1);
     }

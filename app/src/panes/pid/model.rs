@@ -244,7 +244,10 @@ fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankVi
         leak_cm3_s: now.leak_cm3_s,
         leak: [0.0, 13.0].map(|down| pos2(rect.left() + 0.22 * rect.width(), rect.bottom() + down)),
         spill: [pos2(x, rect.top()), pos2(x, bottom)],
-        fed_on_the_right: snapshot.network.pumps.iter().any(|p| p.from.is_none() && p.to == i),
+        fed_on_the_right: layout.discharges.iter().chain(layout.branches.iter().flatten()).any(|route| {
+            let end = route.pipe.last().filter(|_| route.falls_into == Some(i));
+            end.is_some_and(|end| end.x > layout.tanks[i].center().x + 0.1)
+        }),
         setpoint_cm: held.map(|l| l.setpoint_cm),
     }
 }

@@ -297,8 +297,13 @@ pub fn pump(painter: &Painter, view: &PumpView, scale: f32, hovered: bool, p: &P
         let at = view.at + vec2(r * 0.2 + 2.0, r + 3.0);
         painter.text(at, Align2::CENTER_TOP, &view.tag, theme::bold_font(12.0), p.text);
         painter.text(at + vec2(0.0, 15.0), Align2::CENTER_TOP, input, FontId::proportional(12.0), p.mv);
-        if let [_, corner, end, ..] = view.discharge.pipe[..] {
-            let middle = corner + (end - corner) * 0.5;
+        // Where streams split, beside the pump's own pipe: the middle belongs to others as well.
+        let run = |stream: &&StreamView| stream.pipe.get(1..3).map_or(0.0, |p| (p[1] - p[0]).length());
+        let longest =
+            std::iter::once(&view.discharge).chain(&view.branches).max_by(|a, b| run(a).total_cmp(&run(b)));
+        if let Some([_, corner, end, ..]) = longest.map(|stream| &stream.pipe[..]) {
+            let share = if view.branches.is_empty() { 0.5 } else { 0.4 * scale / (*end - *corner).length() };
+            let middle = *corner + (*end - *corner) * share.min(0.5);
             painter.text(
                 middle - vec2(0.0, 9.0),
                 Align2::CENTER_BOTTOM,
