@@ -69,13 +69,13 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     let network = &view.snapshot.network;
     let rim = network.tanks[network.sensors[now.sensor].tank].height_cm;
     let unit = mv_unit(view, now);
-    let height = (ui.available_height() - 254.0).clamp(44.0, 260.0);
+    let height = (ui.available_height() - 248.0).clamp(28.0, 260.0);
     let columns = [
         ("PV", now.pv_cm, 0.0, rim, "cm", 2, p.pv),
         ("SP", now.setpoint_cm, 0.0, rim, "cm", 2, p.sp),
         ("MV", now.mv, now.range.low, now.range.high, unit, 2, p.mv),
     ];
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 54.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height + 38.0), Sense::hover());
     response.widget_info(|| {
         let words = columns.map(|(n, v, .., u, d, _)| format!("{n} {} {u}", text::fixed(v, d))).join(", ");
         WidgetInfo::labeled(Role::Label, true, words)
@@ -84,12 +84,16 @@ fn bars(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
     for (i, (name, value, low, high, unit, decimals, colour)) in columns.into_iter().enumerate() {
         let x = rect.left() + width * (i as f32 + 0.5);
         let well = Rect::from_center_size(pos2(x, rect.top() + 18.0 + height * 0.5), vec2(26.0, height));
-        ui.painter().text(pos2(x, rect.top()), Align2::CENTER_TOP, name, theme::bold_font(13.0), colour);
+        let name = ui.painter().layout_no_wrap(name.to_owned(), theme::bold_font(13.0), colour);
+        let unit = ui.painter().layout_no_wrap(unit.to_owned(), FontId::proportional(11.0), p.weak);
+        let left = x - 0.5 * (name.size().x + 3.0 + unit.size().x);
+        let under = name.size().y - unit.size().y;
+        ui.painter().galley(pos2(left + name.size().x + 3.0, rect.top() + under), unit, p.weak);
+        ui.painter().galley(pos2(left, rect.top()), name, colour);
         bar(ui, well, ((value - low) / (high - low)) as f32, colour, &p);
         let reading = text::fixed(value, decimals);
         let at = pos2(x, well.bottom() + 3.0);
         ui.painter().text(at, Align2::CENTER_TOP, reading, theme::bold_font(17.0), p.text);
-        ui.painter().text(at + vec2(0.0, 20.0), Align2::CENTER_TOP, unit, FontId::proportional(12.0), p.weak);
         for (share, value) in [(1.0, high), (0.0, low)] {
             let y = well.bottom() - share * well.height();
             let at = pos2(well.right() + 3.0, y);

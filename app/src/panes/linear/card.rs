@@ -26,6 +26,16 @@ pub enum At {
 impl At {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Setpoints, Self::Inputs, Self::Now];
+
+    /// End of the key of its explanation.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Setpoints => "setpoints",
+            Self::Inputs => "inputs",
+            Self::Now => "now",
+        }
+    }
 }
 
 /// From one input to one output.

@@ -33,6 +33,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         if let Some(chosen) = segmented(ui, &tr!("linear.at"), &places, chosen) {
             state.at = At::ALL[chosen];
         }
+        ui.weak(tr!(&format!("linear.hint_{}", state.at.key())));
     });
     let key = Key::of(snapshot, state.at);
     if state.made.as_ref().is_none_or(|(known, _)| *known != key) {
@@ -79,7 +80,8 @@ fn point(ui: &mut egui::Ui, view: &View, card: &Card) {
     }
     ui.horizontal_wrapped(|ui| {
         for part in parts {
-            ui.label(RichText::new(part).size(theme::TABLE));
+            // A number stays beside its tag.
+            ui.label(RichText::new(part.replace(' ', "\u{a0}")).size(theme::TABLE));
         }
     });
 }

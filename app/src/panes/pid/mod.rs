@@ -63,7 +63,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let rect = ui.available_rect_before_wrap();
     ui.allocate_rect(rect, Sense::hover());
     let layout = state.layout(&view.snapshot.network);
-    let drawing = rect.shrink2(vec2(6.0, 4.0)).with_max_y(rect.bottom() - 18.0);
+    let drawing = rect.shrink2(vec2(6.0, 4.0)).with_min_y(rect.top() + 22.0).with_max_y(rect.bottom() - 18.0);
     let model = PidModel::new(view.snapshot, &layout, drawing);
     state.advance(&model, ui.input(|i| i.time), view.snapshot.running);
     let phases = &state.phases;
@@ -211,15 +211,10 @@ fn sensor_ui(ui: &mut egui::Ui, view: &View, bubble: &BubbleView, scale: f32, ac
 fn rig_ui(ui: &mut egui::Ui, view: &View, rect: Rect, actions: &mut Vec<Action>) {
     let count = view.snapshot.faults.len();
     let words = if count == 0 { tr!("pid.rig") } else { tr!("pid.rig_faults", count = count) };
-    let galley = ui.painter().layout_no_wrap(
-        words.clone(),
-        egui::FontId::proportional(theme::SMALL),
-        egui::Color32::WHITE,
-    );
-    let size = galley.size() + vec2(14.0, 6.0);
-    let at = Rect::from_min_size(rect.right_bottom() - size, size);
+    let at = Rect::from_min_size(rect.left_top(), vec2(rect.width().min(150.0), 20.0));
     let button = egui::Button::new(egui::RichText::new(words).size(theme::SMALL));
-    let response = ui.put(at, button).on_hover_text(tr!("pid.rig_hint"));
+    let place = egui::UiBuilder::new().max_rect(at).layout(egui::Layout::left_to_right(egui::Align::Min));
+    let response = ui.scope_builder(place, |ui| ui.add(button)).inner.on_hover_text(tr!("pid.rig_hint"));
     egui::Popup::menu(&response)
         .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
         .show(|ui| faults::overview(ui, view.snapshot, actions));
