@@ -1,7 +1,7 @@
 //! The living P&ID: model, layout, paint, and what the pointer does.
 
-pub mod faults;
-mod layout;
+mod faults;
+pub mod layout;
 pub mod model;
 mod paint;
 
