@@ -71,13 +71,17 @@ fn a_spread_spreads_and_the_same_seed_gives_the_same_bytes() {
 
 #[test]
 fn what_hits_a_rim_runs_one_by_one() {
-    let network = preset("stad").expect("preset");
-    let mut scenario = scenario("stad", Measurement::DEFAULT);
-    scenario.start.levels_cm.insert("TQ1".to_owned(), 27.0);
-    scenario.start.inputs.insert("BA01".to_owned(), 3.5);
+    // The tank starts at its rim, with the pump at full flow and its loop too slow to take it back in time.
+    let network = preset("simtank1").expect("preset");
+    let mut scenario = scenario("simtank1", Measurement::DEFAULT);
+    scenario.events[0].command =
+        vasos_engine::session::RigCommand::Setpoint { tag: "LIC-01".to_owned(), level_cm: 29.9 };
+    scenario.events[0].at_s = 0.0;
+    scenario.start.levels_cm.insert("TQ1".to_owned(), 29.99);
+    scenario.start.inputs.insert("BA01".to_owned(), 100.0);
     let run = run_ensemble(&network, &scenario, 8, SPREAD).expect("runs");
     assert_eq!((run.in_lanes, run.members.len()), (0, 8));
-    assert!(run.members.iter().all(|m| m.end_cm.is_finite()));
+    assert!(run.members.iter().all(|m| (29.9..=30.0).contains(&m.level_cm[1])), "{:?}", run.members);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 mod analyze;
 mod compare;
 mod controller;
+mod ensemble;
 mod identify;
 mod json;
 mod model;

@@ -13,7 +13,7 @@ use vasos_io::recording::{Recording, RecordingOptions};
 use vasos_io::rig::{load_scenario, write_run_csv};
 
 use super::json::{self, shown, table};
-use super::{Answer, Refusal};
+use super::{Answer, Refusal, ensemble};
 
 /// Rows handed to the recorder at once.
 const BLOCK: usize = 5000;
@@ -24,6 +24,7 @@ const BLOCK: usize = 5000;
 Examples:
   vasos simulate assets/scenarios/setpoint_coupled.toml -o run.csv
   vasos simulate run.toml -o run.rrd     (a recording, for Rerun's viewer)
+  vasos simulate run.toml --runs 1000 --spread 2
 Without -o the values at the end are printed. The format of scenarios is in assets/SCHEMA.md.
 --figures: of each loop from its last setpoint step to the end; without a step, or where the setpoint is another
 loop's output, of the whole run as after a load. They are taken from the rows that are kept (keep_every).")]
@@ -37,6 +38,12 @@ pub struct Arguments {
     /// every loop.
     #[arg(long)]
     figures: bool,
+    /// Run that many rigs at once, which differ from the file by --spread, each with noise of its own.
+    #[arg(long, value_name = "N", conflicts_with_all = ["figures", "output"])]
+    runs: Option<usize>,
+    /// With --runs: standard deviation of every valve's k, tank's area and pump's flow, in percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, requires = "runs")]
+    spread: f64,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -45,6 +52,9 @@ pub struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let kind = arguments.output.as_deref().map(extension).transpose()?;
     let (scenario, network) = load_scenario(&arguments.scenario).map_err(Refusal::of)?;
+    if let Some(count) = arguments.runs {
+        return ensemble::run(&network, &scenario, count, arguments.spread / 100.0, arguments.json);
+    }
     let run = run_scenario(network.clone(), &scenario).map_err(Refusal::of)?;
     if let (Some(path), Some(kind)) = (&arguments.output, kind) {
         match kind {
