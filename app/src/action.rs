@@ -53,6 +53,12 @@ pub enum Action {
     DropKeptRun,
     /// Fit a model to the chosen stretch.
     Identify,
+    /// Show an experiment.
+    ChooseExperiment(String),
+    /// Carry an experiment out.
+    RunExperiment(String),
+    /// End the experiment that runs.
+    CancelExperiment,
     /// Show a pane alone, or all of them again.
     Maximise(PaneKind),
     /// Panes as at the first start.

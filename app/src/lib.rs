@@ -8,6 +8,7 @@ rust_i18n::i18n!("../assets/locales", fallback = "en");
 
 pub mod action;
 pub mod cli;
+pub mod experiments;
 pub mod i18n;
 pub mod journal;
 pub mod panes;

@@ -3,6 +3,7 @@
 //! Everything that comes from outside passes here once and leaves as a checked type of the engine, or as
 //! an error that says what to do. The original files are never written to.
 
+pub mod experiment;
 pub mod log;
 pub mod recording;
 pub mod rig;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::rig_lines::{line_of, line_of_configuration};
+use vasos_engine::experiment::ExperimentError;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::{Network, RigError, RigSpec};
 use vasos_engine::session::CommandError;
@@ -74,6 +75,16 @@ pub enum FileError {
         /// Why not.
         error: Box<CommandError>,
     },
+    /// It describes an experiment that cannot be.
+    #[error("{}: {error}", place(name, *.line))]
+    Experiment {
+        /// File name.
+        name: String,
+        /// Line of the run, table or check at fault, from 1, where it has one.
+        line: Option<usize>,
+        /// What is wrong.
+        error: Box<ExperimentError>,
+    },
     /// It cannot be written.
     #[error("{path} cannot be written: {reason}")]
     Write {
@@ -97,6 +108,8 @@ impl Explain for FileError {
             Self::Rig { .. } => "file.rig_line",
             Self::Start { line: None, .. } => "file.start",
             Self::Start { .. } => "file.start_line",
+            Self::Experiment { line: None, .. } => "file.experiment",
+            Self::Experiment { .. } => "file.experiment_line",
             Self::Write { .. } => "file.write",
         }
     }
@@ -110,6 +123,11 @@ impl Explain for FileError {
                 vec![("name", name.clone()), ("line", line.to_string()), ("reason", reason.clone())]
             }
             Self::Rig { name, line, error } => {
+                let mut args = vec![("name", name.clone()), ("error", error.to_string())];
+                args.extend(line.map(|line| ("line", line.to_string())));
+                args
+            }
+            Self::Experiment { name, line, error } => {
                 let mut args = vec![("name", name.clone()), ("error", error.to_string())];
                 args.extend(line.map(|line| ("line", line.to_string())));
                 args
@@ -130,6 +148,7 @@ impl Explain for FileError {
         match self {
             Self::Rig { error, .. } => Some(error),
             Self::Start { error, .. } => Some(&**error),
+            Self::Experiment { error, .. } => Some(&**error),
             _ => None,
         }
     }
@@ -151,6 +170,8 @@ impl FileError {
             Self::Format { name: text("a.toml"), line: 3, reason: text("expected a number") },
             Self::Rig { name: text("a.toml"), line: None, error: RigError::NoTank },
             Self::Rig { name: text("a.toml"), line: Some(12), error: RigError::NoTank },
+            Self::Experiment { name: text("a.toml"), line: None, error: Box::new(ExperimentError::Empty) },
+            Self::Experiment { name: text("a.toml"), line: Some(9), error: Box::new(ExperimentError::Empty) },
             start(None),
             start(Some(70)),
             Self::Write { path: text("a.csv"), reason: text("disk full") },
@@ -266,7 +287,7 @@ fn write_csv(
     writer.flush().map_err(|e| failed(e.to_string()))
 }
 
-fn parse<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, FileError> {
+pub(crate) fn parse<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, FileError> {
     toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start.min(text.len()));
         let line = text.get(..start).map_or(1, |before| before.matches('\n').count() + 1);
@@ -274,7 +295,7 @@ fn parse<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, Fi
     })
 }
 
-fn read_text(path: &Path) -> Result<String, FileError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     let failed = |reason: String| FileError::Read { path: path.display().to_string(), reason };
     if path.is_dir() {
         return Err(failed("it is a folder; choose the file inside it".to_owned()));
@@ -282,6 +303,6 @@ fn read_text(path: &Path) -> Result<String, FileError> {
     std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))
 }
 
-fn file_name(path: &Path) -> String {
+pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }

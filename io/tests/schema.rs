@@ -1,8 +1,11 @@
 //! The examples of assets/SCHEMA.md and the scenarios that ship are read and run.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
+use vasos_engine::experiment::{ExperimentEnd, run_experiment};
 use vasos_engine::sim::{Scenario, run_scenario};
+use vasos_io::experiment::parse_experiment;
 use vasos_io::rig::{load_scenario, parse_rig, write_run_csv};
 
 fn assets() -> PathBuf {
@@ -68,4 +71,16 @@ fn every_scenario_that_ships_runs_and_is_the_same_each_time() {
         count += 1;
     }
     assert!(count >= 4, "{count}");
+}
+
+#[test]
+fn the_experiment_example_reaches_its_outcome() {
+    let experiment = parse_experiment("SCHEMA.md", &example("experiment"), Path::new(""))
+        .unwrap_or_else(|error| panic!("{error}"));
+    let end = run_experiment(&experiment, &AtomicBool::new(false), &mut |_| {});
+    let ExperimentEnd::Finished(run) = end.unwrap_or_else(|error| panic!("{error}")) else {
+        panic!("nobody cancels")
+    };
+    assert!(run.reached(), "{:#?}", run.checks);
+    assert_eq!(run.runs.len(), 6, "two of the sweep, one of each other kind, and a table");
 }

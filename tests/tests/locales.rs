@@ -8,6 +8,7 @@ use vasos_app::cli::parse::ParseError;
 use vasos_engine::analyze::MetricsError;
 use vasos_engine::control::{FormError, GainsError};
 use vasos_engine::document::DocumentError;
+use vasos_engine::experiment::{ExperimentError, RunError};
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{FitError, FitVerdict};
 use vasos_engine::model::{ModelError, ReduceError, StateSpaceError};
@@ -208,6 +209,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("LinearError", boxed(LinearError::samples())),
         ("ReduceError", boxed(ReduceError::samples())),
         ("StateSpaceError", boxed(StateSpaceError::samples())),
+        ("ExperimentError", boxed(ExperimentError::samples())),
+        ("RunError", vec![Box::new(RunError::Rig(RigError::NoTank))]),
         ("GainsError", boxed(GainsError::samples())),
         ("FormError", boxed(FormError::samples())),
         ("ModelError", boxed(ModelError::samples())),

@@ -7,6 +7,7 @@ mod analyze;
 mod compare;
 mod controller;
 mod ensemble;
+mod experiment;
 mod identify;
 mod json;
 mod model;
@@ -35,7 +36,8 @@ Examples:
   vasos identify step.csv --pv h2 --mv u --json
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
   vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
-  vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series";
+  vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series
+  vasos experiment stad_figure_7";
 
 /// Process control workbench: simulate, identify, tune, analyse.
 #[derive(Debug, Parser)]
@@ -65,6 +67,8 @@ pub enum Command {
     Analyze(analyze::Arguments),
     /// Convert gains between the forms of controllers, or write a controller as structured text.
     Controller(controller::Arguments),
+    /// Run a prepared experiment, and say whether it came out as expected.
+    Experiment(experiment::Arguments),
     /// Not available yet: identify, tune, compare and report in one go.
     Retune(Later),
     /// Not available yet: fit a rig to a recording.
@@ -75,8 +79,6 @@ pub enum Command {
     Record(Later),
     /// Not available yet: replay a recording.
     Replay(Later),
-    /// Not available yet: run a prepared experiment.
-    Experiment(Later),
 }
 
 /// Arguments of a command that is to come.
@@ -153,12 +155,12 @@ pub fn run(cli: Cli) -> CliOutcome {
         Command::Tune(arguments) => tune::run(arguments),
         Command::Analyze(arguments) => analyze::run(arguments),
         Command::Controller(arguments) => controller::run(arguments),
+        Command::Experiment(arguments) => experiment::run(arguments),
         Command::Retune(_) => Err(Refusal::later("vasos retune")),
         Command::FitPlant(_) => Err(Refusal::later("vasos fit-plant")),
         Command::Serve(_) => Err(Refusal::later("vasos serve")),
         Command::Record(_) => Err(Refusal::later("vasos record")),
         Command::Replay(_) => Err(Refusal::later("vasos replay")),
-        Command::Experiment(_) => Err(Refusal::later("vasos experiment")),
     };
     CliOutcome::Exit(say(answered))
 }
@@ -209,7 +211,7 @@ mod tests {
 
     #[test]
     fn what_is_to_come_says_so() {
-        for command in ["retune", "fit-plant", "serve", "record", "replay", "experiment"] {
+        for command in ["retune", "fit-plant", "serve", "record", "replay"] {
             assert_eq!(outcome(&[command, "--list", "x"]), CliOutcome::Exit(2), "{command}");
         }
     }

@@ -1,5 +1,6 @@
 //! The panes: each a function of (view, own state) to actions.
 
+pub mod experiments;
 pub mod faceplate;
 pub mod identify;
 pub mod linear;
@@ -17,6 +18,7 @@ use vasos_engine::document::Document;
 use vasos_engine::session::Snapshot;
 
 use crate::action::Action;
+use crate::experiments::Desk;
 use crate::journal::Entry;
 use crate::traces::{LogTrace, RunTrace};
 use crate::tuning::TuningTable;
@@ -41,13 +43,15 @@ pub enum PaneKind {
     Nyquist,
     /// Its time responses.
     Step,
+    /// Prepared experiments.
+    Experiments,
     /// What happened.
     Log,
 }
 
 impl PaneKind {
     /// Every pane.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Pid,
         Self::Faceplate,
         Self::Trend,
@@ -56,6 +60,7 @@ impl PaneKind {
         Self::Tune,
         Self::Nyquist,
         Self::Step,
+        Self::Experiments,
         Self::Log,
     ];
 
@@ -71,6 +76,7 @@ impl PaneKind {
             Self::Tune => "pane.tune",
             Self::Nyquist => "pane.nyquist",
             Self::Step => "pane.step",
+            Self::Experiments => "pane.experiments",
             Self::Log => "pane.log",
         }
     }
@@ -94,6 +100,8 @@ pub struct View<'a> {
     pub focus: usize,
     /// A fit is under way.
     pub fitting: bool,
+    /// Experiments and their results.
+    pub experiments: &'a Desk,
     /// What happened, newest last.
     pub journal: &'a VecDeque<Entry>,
 }
@@ -117,6 +125,8 @@ pub struct States {
     pub nyquist: nyquist::State,
     /// Of the step plot.
     pub step: step::State,
+    /// Of the experiments.
+    pub experiments: experiments::State,
     /// Of the log.
     pub log: log::State,
 }
@@ -132,6 +142,7 @@ pub fn ui(kind: PaneKind, ui: &mut egui::Ui, view: &View, states: &mut States) -
         PaneKind::Tune => tune::ui(ui, view, &mut states.tune),
         PaneKind::Nyquist => nyquist::ui(ui, view, &mut states.nyquist),
         PaneKind::Step => step::ui(ui, view, &mut states.step),
+        PaneKind::Experiments => experiments::ui(ui, view, &mut states.experiments),
         PaneKind::Log => log::ui(ui, view, &mut states.log),
     }
 }

@@ -70,6 +70,17 @@ impl Workbench {
             Action::KeepRun => self.kept = Some(self.run.clone()),
             Action::DropKeptRun => self.kept = None,
             Action::Identify => self.identify(),
+            Action::ChooseExperiment(id) => self.desk.chosen = id,
+            Action::RunExperiment(id) => {
+                if let Some(run) = self.desk.start(&id) {
+                    self.beside.start("experiment", move || Outcome::Ran(Box::new(run())));
+                }
+            }
+            Action::CancelExperiment => {
+                if let Some(under_way) = &self.desk.under_way {
+                    under_way.cancel();
+                }
+            }
             Action::Maximise(kind) => {
                 self.maximised = if self.maximised == Some(kind) { None } else { Some(kind) };
             }

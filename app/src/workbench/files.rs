@@ -1,15 +1,19 @@
 //! Files into the window: dropped, chosen or typed; logs with their import sheet, rigs.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use eframe::egui;
 use vasos_engine::document::{DocumentCommand, LogRoles};
+use vasos_engine::experiment::ExperimentEnd;
+use vasos_io::experiment::load_experiment;
 use vasos_io::log::{ImportOptions, ImportedLog, import_log};
 use vasos_io::rig::{FileError, load_rig};
 
 use super::Workbench;
 use super::jobs::Outcome;
 use crate::action::Action;
+use crate::experiments::Finished;
 use crate::journal::Weight;
 use crate::{i18n, text, theme, tr};
 
@@ -34,9 +38,17 @@ impl ImportSheet {
     }
 }
 
-/// Reads a file in a job: a rig when it ends in `.toml`, else a log.
+/// Reads a file in a job: a rig or an experiment when it ends in `.toml`, else a log.
 pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        // Only an experiment expects something.
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        if text.lines().any(|line| line.trim_start().starts_with("[[check")) {
+            return match load_experiment(&path.to_string_lossy()) {
+                Ok(experiment) => Outcome::Experiment(path.to_owned(), Arc::new(experiment)),
+                Err(error) => Outcome::Failed(Box::new(error)),
+            };
+        }
         return match load_rig(&path.to_string_lossy()) {
             Ok(network) => Outcome::Rig(path.to_owned(), network),
             Err(error) => Outcome::Failed(Box::new(error)),
@@ -61,6 +73,24 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
 }
 
 impl Workbench {
+    /// Takes what an experiment came to.
+    fn take_experiment(&mut self, finished: Finished) {
+        self.desk.under_way = None;
+        match finished.end {
+            Ok(ExperimentEnd::Finished(run)) => {
+                let words =
+                    if run.reached() { "event.experiment_reached" } else { "event.experiment_missed" };
+                let weight = if run.reached() { Weight::Note } else { Weight::Caution };
+                self.tell(weight, tr!(words, id = finished.id));
+                self.desk.results.insert(finished.id, Arc::new(run));
+            }
+            Ok(ExperimentEnd::Cancelled) => {
+                self.tell(Weight::Note, tr!("event.experiment_cancelled", id = finished.id));
+            }
+            Err(error) => self.refuse(i18n::say(&error)),
+        }
+    }
+
     /// Opens what was dropped on the window in this frame. A frame drawn twice brings the same drop twice.
     pub(super) fn take_dropped(&mut self, ui: &egui::Ui, actions: &mut Vec<Action>) {
         let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().cloned()) else { return };
@@ -73,7 +103,7 @@ impl Workbench {
 
     /// Takes what jobs came to.
     pub(super) fn take_results(&mut self, ctx: &egui::Context) {
-        for outcome in self.jobs.results() {
+        for outcome in self.jobs.results().into_iter().chain(self.beside.results()) {
             match outcome {
                 Outcome::Log(path, log) => {
                     let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
@@ -84,6 +114,11 @@ impl Workbench {
                     self.settings.remember(path);
                     self.act(ctx, Action::Document(DocumentCommand::OpenRig(network)));
                 }
+                Outcome::Experiment(path, experiment) => {
+                    self.settings.remember(path);
+                    self.desk.add(experiment);
+                }
+                Outcome::Ran(finished) => self.take_experiment(*finished),
                 Outcome::Model(model) => self.act(ctx, Action::Document(DocumentCommand::AddModel(model))),
                 Outcome::Chosen(path) => self.act(ctx, Action::OpenFile(path)),
                 Outcome::Recorded(path, rows) => {

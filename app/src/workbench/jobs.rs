@@ -7,9 +7,12 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use eframe::egui;
 use vasos_engine::document::NewModel;
+use vasos_engine::experiment::Experiment;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::Network;
 use vasos_io::log::ImportedLog;
+
+use crate::experiments::Finished;
 
 /// A dialog that answers faster than any hand was never shown.
 const NO_DIALOG: Duration = Duration::from_millis(100);
@@ -25,6 +28,10 @@ pub enum Outcome {
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.
     Model(Box<NewModel>),
+    /// An experiment was read from a file.
+    Experiment(PathBuf, Arc<Experiment>),
+    /// An experiment has ended.
+    Ran(Box<Finished>),
     /// A recording is complete, with so many rows.
     Recorded(PathBuf, u64),
     /// A file was chosen.

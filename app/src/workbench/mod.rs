@@ -17,6 +17,7 @@ use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
 use crate::action::Action;
+use crate::experiments::Desk;
 use crate::i18n;
 use crate::journal::{self, Entry, Weight};
 use crate::panes::{PaneKind, States, View};
@@ -54,6 +55,9 @@ pub struct Workbench {
     states: States,
     settings: Settings,
     jobs: Jobs,
+    /// Work that nobody has to wait for: fits and imports go on meanwhile.
+    beside: Jobs,
+    desk: Desk,
     import: Option<ImportSheet>,
     recording: Option<vasos_io::recording::Recording>,
     path_field: Option<String>,
@@ -93,6 +97,8 @@ impl Workbench {
             maximised: None,
             states: States::default(),
             jobs: Jobs::new(ctx.clone()),
+            beside: Jobs::new(ctx.clone()),
+            desk: Desk::default(),
             import: None,
             recording: None,
             path_field: None,
@@ -186,6 +192,7 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut egui::Ui) {
         let snapshot = self.session.snapshot();
         let document = self.history.document().clone();
+        self.desk.list();
         let mut actions = self.keys(ui);
         self.take_dropped(ui, &mut actions);
         actions.extend(self.top_bar(ui, &snapshot, &document));
@@ -199,6 +206,7 @@ impl Workbench {
             tuning: &self.tuning,
             focus: self.states.faceplate.shown,
             fitting: self.jobs.is_busy(),
+            experiments: &self.desk,
             journal: &self.journal,
         };
         egui::CentralPanel::default_margins()

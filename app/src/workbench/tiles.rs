@@ -17,8 +17,11 @@ pub fn first_layout() -> Tree<PaneKind> {
         let children = panes.iter().map(|p| tiles.insert_pane(*p)).collect();
         tiles.insert_tab_tile(children)
     };
-    let above: Vec<TileId> =
-        [PaneKind::Pid, PaneKind::Faceplate, PaneKind::Trend].map(|p| tab(&mut tiles, &[p])).into();
+    let above: Vec<TileId> = vec![
+        tab(&mut tiles, &[PaneKind::Pid]),
+        tab(&mut tiles, &[PaneKind::Faceplate]),
+        tab(&mut tiles, &[PaneKind::Trend, PaneKind::Experiments]),
+    ];
     let below: Vec<TileId> = vec![
         tab(&mut tiles, &[PaneKind::Identify, PaneKind::Linear]),
         tab(&mut tiles, &[PaneKind::Tune]),

@@ -150,6 +150,21 @@ pub fn metrics(
     metrics_about(time_s, r, y, u, excitation, None)
 }
 
+/// [`metrics`] of a run of which it is known where y comes to rest.
+///
+/// # Errors
+/// [`MetricsError`] as there.
+pub fn metrics_at_rest(
+    time_s: &[f64],
+    r: &[f64],
+    y: &[f64],
+    u: &[f64],
+    excitation: Excitation,
+    final_value: f64,
+) -> Result<Metrics, MetricsError> {
+    metrics_about(time_s, r, y, u, excitation, Some(final_value))
+}
+
 /// [`metrics`] with the final value known; without, it is the mean of the run's last twentieth.
 pub(super) fn metrics_about(
     time_s: &[f64],

@@ -17,6 +17,6 @@ mod sweep;
 
 pub use analysis::{Analysis, analyze, analyze_loop, is_closed_loop_stable};
 pub use frequency::{CurveOptions, LoopFunction, frequency_curve, frequency_range};
-pub use metrics::{Excitation, Metrics, MetricsError, metrics};
+pub use metrics::{Excitation, Metrics, MetricsError, metrics, metrics_at_rest};
 pub use open_loop::OpenLoop;
 pub use response::{Response, ResponseEnd, ResponseOptions, StepFigures, step_figures, step_response};

@@ -9,6 +9,7 @@
 
 mod eigen;
 mod half_rule;
+mod held_input;
 mod process_model;
 pub(crate) mod realization;
 mod reduce_error;
@@ -23,6 +24,7 @@ mod zero_pole_gain;
 mod zeros;
 
 pub use half_rule::{ReducedOrder, half_rule};
+pub use held_input::HeldInput;
 pub use process_model::{Fopdt, Ipdt, ModelError, ProcessModel, Sopdt};
 pub use reduce_error::ReduceError;
 pub use simulate::{SampledInput, simulate, simulate_process};

@@ -135,7 +135,7 @@ impl StateSpace {
 }
 
 /// e^(Ah) and ∫₀ʰ e^(As) ds B, by the exponential of the matrix that also holds the input.
-fn held(a: &DMatrix<f64>, b: &DMatrix<f64>, h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+pub(super) fn held(a: &DMatrix<f64>, b: &DMatrix<f64>, h: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let (n, m) = b.shape();
     if n == 0 || h == 0.0 {
         return (DMatrix::identity(n, n), DMatrix::zeros(n, m));

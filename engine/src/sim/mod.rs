@@ -16,5 +16,7 @@ pub use compare::{CompareError, Comparison, InputSeries, ModelKind, ModelTrace, 
 pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, run_ensemble, vary};
 pub use figures::LoopFigures;
 pub use real_rig::{LevelResistance, record_real_rig};
-pub use scenario::{Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario, scenario_start};
+pub use scenario::{
+    Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario, run_scenario_while, scenario_start,
+};
 pub use start::{StartError, check_starts};

@@ -192,37 +192,86 @@ pub(super) fn prepare(network: &Arc<Network>, scenario: &Scenario) -> Result<Pre
 /// [`ScenarioError`] naming the time of the refused command, or the length that is not possible.
 pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, ScenarioError> {
     let Prepared { mut closed, events, samples } = prepare(&network, scenario)?;
-    let keep = u64::from(scenario.keep_every.max(1));
-    let mut time_s = Vec::new();
-    let mut values = Vec::new();
-    run_samples(&mut closed, &events, samples, |sample, now_s, row| {
-        if sample % keep == 0 {
-            time_s.push(now_s);
-            values.extend_from_slice(row);
-        }
-    })?;
-    let integrator_steps = closed.source().plant().map_or(0, crate::plant::Plant::steps);
-    Ok(Run { channels: closed.channels().clone(), time_s, values, integrator_steps })
+    let mut run = Rows::new(scenario);
+    run_samples(&mut closed, &events, samples, |sample, now_s, row| run.see(sample, now_s, row))?;
+    Ok(run.finish(&closed))
 }
 
-/// Takes samples, each preceded by the commands that are due, and shows every row with its number and time.
+/// Samples between two questions whether to go on.
+const STRIDE: u64 = 4096;
+
+/// [`run_scenario`] as long as `go_on` says so, which is asked now and then with the share done; `None` otherwise.
+///
+/// # Errors
+/// [`ScenarioError`] as there.
+pub fn run_scenario_while(
+    network: Arc<Network>,
+    scenario: &Scenario,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<Run>, ScenarioError> {
+    let Prepared { mut closed, events, samples } = prepare(&network, scenario)?;
+    let mut run = Rows::new(scenario);
+    let (mut done, mut due) = (0, events.as_slice());
+    while done < samples {
+        if !go_on(done as f64 / samples as f64) {
+            return Ok(None);
+        }
+        let count = STRIDE.min(samples - done);
+        let used = run_samples(&mut closed, due, count, |sample, now_s, row| {
+            run.see(done + sample, now_s, row);
+        })?;
+        due = &due[used..];
+        done += count;
+    }
+    Ok(Some(run.finish(&closed)))
+}
+
+/// The rows of a run as they come.
+struct Rows {
+    keep: u64,
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Rows {
+    fn new(scenario: &Scenario) -> Self {
+        Self { keep: u64::from(scenario.keep_every.max(1)), time_s: Vec::new(), values: Vec::new() }
+    }
+
+    fn see(&mut self, sample: u64, now_s: f64, row: &[f64]) {
+        if sample.is_multiple_of(self.keep) {
+            self.time_s.push(now_s);
+            self.values.extend_from_slice(row);
+        }
+    }
+
+    fn finish(self, closed: &ClosedLoop) -> Run {
+        let integrator_steps = closed.source().plant().map_or(0, crate::plant::Plant::steps);
+        let Self { time_s, values, .. } = self;
+        Run { channels: closed.channels().clone(), time_s, values, integrator_steps }
+    }
+}
+
+/// Takes samples, each preceded by the commands that are due, and shows every row with its number and time. Gives the
+/// number of commands carried out.
 pub(super) fn run_samples(
     closed: &mut ClosedLoop,
     events: &[ScenarioEvent],
     samples: u64,
     mut see: impl FnMut(u64, f64, &[f64]),
-) -> Result<(), ScenarioError> {
-    let mut pending = events.iter().peekable();
+) -> Result<usize, ScenarioError> {
+    let mut used = 0;
     for sample in 0..samples {
         let now_s = closed.time_s();
-        while let Some(event) = pending.next_if(|e| e.at_s <= now_s + 1e-9) {
+        while let Some(event) = events.get(used).filter(|e| e.at_s <= now_s + 1e-9) {
             closed
                 .apply(&event.command)
                 .map_err(|error| ScenarioError::Command { at_s: event.at_s, error })?;
+            used += 1;
         }
         see(sample, now_s, closed.step());
     }
-    Ok(())
+    Ok(used)
 }
 
 /// Where a scenario starts: levels, inputs, angles and delays before its first sample, and its configuration's index.
