@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use eframe::egui::{self, RichText, Role, WidgetInfo};
 use egui_extras::{Column, TableBuilder};
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{Corner, Legend, Line, Plot, PlotPoints};
 use vasos_engine::experiment::{CheckOutcome, Expectation, Experiment, ExperimentRun, RunResult};
 
 use crate::action::Action;
@@ -26,8 +26,6 @@ const CURVES: usize = 12;
 pub struct State {
     /// Column in the plot; empty for the first.
     column: String,
-    /// Plot or expectations.
-    plot: bool,
 }
 
 /// Draws the pane.
@@ -42,9 +40,10 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             ui.vertical(|ui| body(ui, desk, state, &mut actions));
         });
     } else {
-        let shown = desk.in_view().map_or(String::new(), |e| title(e));
-        let combo =
-            egui::ComboBox::from_id_salt("experiment").width(ui.available_width() - 8.0).selected_text(shown);
+        let shown = desk.in_view().map_or(String::new(), |e| title(e.as_ref()));
+        let combo = egui::ComboBox::from_id_salt("experiment_choice")
+            .width(ui.available_width() - 8.0)
+            .selected_text(shown);
         let combo = combo.show_ui(ui, |ui| entries(ui, desk, &mut actions));
         combo.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, tr!("experiments.choose")));
         body(ui, desk, state, &mut actions);
@@ -61,7 +60,7 @@ fn title(experiment: &Experiment) -> String {
 }
 
 fn list(ui: &mut egui::Ui, desk: &Desk, actions: &mut Vec<Action>) {
-    egui::ScrollArea::vertical().id_salt("experiments").auto_shrink(false).show(ui, |ui| {
+    egui::ScrollArea::vertical().id_salt("experiment_list").auto_shrink(false).show(ui, |ui| {
         entries(ui, desk, actions);
     });
 }
@@ -117,7 +116,7 @@ fn body(ui: &mut egui::Ui, desk: &Desk, state: &mut State, actions: &mut Vec<Act
             verdict(ui, run);
         }
     });
-    egui::ScrollArea::vertical().id_salt("experiment").auto_shrink(false).show(ui, |ui| {
+    egui::ScrollArea::vertical().id_salt("experiment_body").auto_shrink(false).show(ui, |ui| {
         ui.label(RichText::new(title(experiment)).family(theme::bold()).size(15.0));
         let wrapped = |ui: &mut egui::Ui, words: &str| {
             ui.add(egui::Label::new(words).wrap());
@@ -189,7 +188,7 @@ fn plot(ui: &mut egui::Ui, state: &mut State, run: &Arc<ExperimentRun>) {
     Plot::new("experiment_plot")
         .height(230.0)
         .allow_scroll(false)
-        .legend(Legend::default())
+        .legend(Legend::default().position(Corner::LeftTop))
         .grid_color(p.grid)
         .custom_x_axes(vec![plots::x_axis(named(&axis.x_name, &axis.x_unit))])
         .custom_y_axes(vec![plots::y_axis(named(&state.column, unit))])

@@ -28,7 +28,7 @@ pub struct SimulatedRig {
 }
 
 /// Tells the source of spikes from that of noise.
-pub(crate) const MISHAPS: u64 = 0x5b1c_e5;
+pub(crate) const MISHAPS: u64 = 0x005b_1ce5;
 
 impl SimulatedRig {
     /// A rig at the state of its file.

@@ -43,9 +43,9 @@ impl Motions {
     pub fn new(network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
         let areas: Vec<f64> = network.tanks.iter().map(|t| t.area_cm2).collect();
         match widest(network) {
-            ..=8 => Self::Small(Box::new(Motion::new(network, &areas, coefficients, pipes))),
-            ..=16 => Self::Medium(Box::new(Motion::new(network, &areas, coefficients, pipes))),
-            ..=64 => Self::Large(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            0..=8 => Self::Small(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            9..=16 => Self::Medium(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            17..=64 => Self::Large(Box::new(Motion::new(network, &areas, coefficients, pipes))),
             _ => Self::Huge(Box::new(Motion::new(network, &areas, coefficients, pipes))),
         }
     }
