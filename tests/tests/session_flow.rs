@@ -508,3 +508,33 @@ fn random_options(rng: &mut impl Rng, value: f64) -> LoopOptions {
         smith: on(value).map(|gain| SmithModel { gain, time_constant_s: value, dead_time_s: value / 2.0 }),
     }
 }
+
+/// A row is filled part by part; every cell must be what its channel says.
+#[test]
+fn every_cell_of_a_row_is_what_its_channel_says() {
+    for p in PRESETS {
+        let network = preset(p.id).expect("preset");
+        let mut closed = ClosedLoop::simulated(network, 0, Measurement::DEFAULT, 1).expect("starts");
+        for _ in 0..50 {
+            closed.step();
+        }
+        // Flows and levels are those before the sample time passes; outputs those that were written in it.
+        let before = closed.source().plant().expect("simulated").clone();
+        let row = closed.step().to_vec();
+        let after = closed.source().plant().expect("simulated");
+        for (value, channel) in row.iter().zip(&closed.channels().channels) {
+            let expected = match channel.kind {
+                ChannelKind::Level(i) => before.levels_cm()[i],
+                ChannelKind::Arriving(i) => before.arriving_flows_cm3_s()[i],
+                ChannelKind::ValveFlow(i) => before.valve_flows_cm3_s()[i],
+                ChannelKind::Angle(i) => before.angles_deg()[i],
+                ChannelKind::Spill(i) => before.spill_flows_cm3_s()[i],
+                ChannelKind::Input(i) => after.inputs()[i],
+                ChannelKind::Setpoint(i) => closed.loops()[i].control.setpoint_cm,
+                ChannelKind::Pv(i) => closed.readings()[closed.loops()[i].sensor].level_cm,
+                ChannelKind::Mv(i) => closed.loops()[i].control.mv(),
+            };
+            assert_eq!(*value, expected, "{}: {}", p.id, channel.name);
+        }
+    }
+}

@@ -64,6 +64,9 @@ pub(crate) struct Motion<const N: usize, V> {
     pub(super) inflow: [V; N],
     /// What arrives from each pump in the step, in cm³/s.
     pub(super) arriving: [V; N],
+    /// What of the present step's volumes earlier spans have counted.
+    counted: [V; N],
+    counted_s: f64,
     /// Volumes of the span that [`Self::advance`] covered: of streams, from pumps, of what arrived, over rims.
     pub span_volume: [V; N],
     pub span_pumped: [V; N],
@@ -142,6 +145,8 @@ impl<const N: usize, V: Number> Motion<N, V> {
             end_net: zero,
             inflow: zero,
             arriving: zero,
+            counted: zero,
+            counted_s: 0.0,
             span_volume: zero,
             span_pumped: zero,
             span_arriving: zero,
@@ -158,7 +163,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
     pub fn restart(&mut self) {
         let early = |feed: &Feed| feed.source >= self.tanks || !self.streams.drives(feed.source);
         self.look_ahead = self.feeds.iter().all(early) && self.pipes.iter().all(|p| p.delay_s() > 0.0);
-        (self.length_s, self.passed_s) = (0.0, 0.0);
+        self.no_step();
         self.evaluate_end();
     }
 
@@ -220,7 +225,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
 
     /// Takes the next step; false when a tank would pass its rim or its floor, and then nothing has changed.
     fn begin_step(&mut self, longest_s: f64, left_s: f64) -> bool {
-        self.count_span(1.0);
+        self.count_whole();
         let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(longest_s, f64::min);
         let most_s = if self.look_ahead { change_s } else { change_s.min(left_s) };
         self.prepare_step();
@@ -235,12 +240,13 @@ impl<const N: usize, V: Number> Motion<N, V> {
         if !inside {
             (self.end, self.end_flow) = (self.start, self.start_flow);
             self.evaluate_end();
-            (self.length_s, self.passed_s) = (0.0, 0.0);
+            self.no_step();
             return false;
         }
         self.evaluate_end();
         self.end_slope = nodes(|i| self.end_net[i] + self.inflow[i]);
-        (self.length_s, self.passed_s) = (step_s, 0.0);
+        self.no_step();
+        self.length_s = step_s;
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
             if !self.look_ahead {
                 pipe.feed(step_s, self.commanded[i]);
@@ -317,35 +323,48 @@ impl<const N: usize, V: Number> Motion<N, V> {
         let zero = [V::of(0.0); N];
         (self.span_volume, self.span_spills) = (zero, zero);
         (self.span_pumped, self.span_arriving) = (zero, zero);
-        // What of the present step lies before this span does not count.
-        self.count_span(-1.0);
     }
 
     /// Ends the span at the present.
     pub fn end_span(&mut self) {
-        self.count_span(1.0);
-    }
-
-    /// Adds `sign` times what has passed of the present step to the volumes of the span.
-    #[inline(always)]
-    fn count_span(&mut self, sign: f64) {
-        if self.passed_s == 0.0 {
+        if self.passed_s >= self.length_s {
+            self.count_whole();
             return;
         }
-        let whole = self.passed_s >= self.length_s;
-        let share = if whole { 1.0 } else { self.passed_s / self.length_s };
-        let w = Hermite::at(share, self.length_s);
-        let (rise, start, end) = (sign * w.rise, sign * w.start, sign * w.end);
-        for i in 0..N {
-            self.span_volume[i] +=
-                self.volume[i] * rise + self.start_flow[i] * start + self.end_flow[i] * end;
-            self.span_arriving[i] += self.arriving[i] * (sign * self.passed_s);
+        let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
+        let volume: [V; N] =
+            nodes(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end);
+        self.count(volume, self.passed_s);
+    }
+
+    /// Adds what has passed of the present step, all of it, to the volumes of the span.
+    fn count_whole(&mut self) {
+        self.count(self.volume, self.length_s);
+    }
+
+    /// Adds what the present step has moved so far, less what earlier spans have counted of it.
+    #[inline(always)]
+    fn count(&mut self, volume: [V; N], passed_s: f64) {
+        let new_s = passed_s - self.counted_s;
+        if new_s <= 0.0 {
+            return;
         }
-        if !self.look_ahead {
-            for i in 0..N {
-                self.span_pumped[i] += self.commanded[i] * (sign * self.passed_s);
+        for i in 0..self.streams.len() {
+            self.span_volume[i & (N - 1)] += volume[i & (N - 1)] - self.counted[i & (N - 1)];
+        }
+        for i in 0..self.feeds.len() {
+            self.span_arriving[i & (N - 1)] += self.arriving[i & (N - 1)] * new_s;
+            if !self.look_ahead {
+                self.span_pumped[i & (N - 1)] += self.commanded[i & (N - 1)] * new_s;
             }
         }
+        (self.counted, self.counted_s) = (volume, passed_s);
+    }
+
+    /// The present step is over, or not begun: nothing of it has been counted.
+    pub(super) fn no_step(&mut self) {
+        (self.length_s, self.passed_s) = (0.0, 0.0);
+        (self.counted, self.counted_s) = ([V::of(0.0); N], 0.0);
     }
 
     /// Level of a node now, in cm; of outside and floor, the volume in cm³.
@@ -392,6 +411,6 @@ impl<const N: usize, V: Number> Motion<N, V> {
             }
             self.evaluate_end();
         }
-        (self.length_s, self.passed_s) = (0.0, 0.0);
+        self.no_step();
     }
 }

@@ -44,7 +44,7 @@ impl<const N: usize> Motion<N, f64> {
         self.runge_kutta::<true>(step_s);
         self.mend(network, step_s, fed, dry);
         self.evaluate_end();
-        (self.length_s, self.passed_s) = (0.0, 0.0);
+        self.no_step();
         self.steps += 1;
         step_s
     }

@@ -203,7 +203,9 @@ impl<const N: usize, V: Number> Streams<N, V> {
             sum[one.slot & (N - 1)] += f1 * weight;
             sum[two.slot & (N - 1)] += f2 * weight;
             self.add(one, &columns[0], f1, &mut slope);
-            self.add(two, &columns[1], f2, &mut slope);
+            if two.slot < self.origins.len() {
+                self.add(two, &columns[1], f2, &mut slope);
+            }
         }
         slope
     }

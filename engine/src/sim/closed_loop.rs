@@ -10,7 +10,7 @@ use crate::plant::{
     steady_at_level,
 };
 use crate::session::{CommandError, RigCommand};
-use crate::signal::{ChannelKind, ChannelSet};
+use crate::signal::ChannelSet;
 
 /// A source under control.
 pub struct ClosedLoop {
@@ -177,29 +177,26 @@ impl ClosedLoop {
         &self.row
     }
 
+    /// Fills the row in the order of [`ChannelSet::of`].
     fn fill_row(&mut self) {
-        let plant = self.source.plant();
-        let of =
-            |values: Option<&[f64]>, i: usize| values.and_then(|v| v.get(i)).copied().unwrap_or(f64::NAN);
-        let (levels, inputs) = (plant.map(|p| p.levels_cm()), plant.map(|p| p.inputs()));
-        let (through, angles) = (plant.map(|p| p.valve_flows_cm3_s()), plant.map(|p| p.angles_deg()));
-        let (arriving, spills) =
-            (plant.map(|p| p.arriving_flows_cm3_s()), plant.map(|p| p.spill_flows_cm3_s()));
-        for (value, channel) in self.row.iter_mut().zip(&self.channels.channels) {
-            *value = match channel.kind {
-                ChannelKind::Level(i) => of(levels, i),
-                ChannelKind::Input(i) => of(inputs, i),
-                ChannelKind::Arriving(i) => of(arriving, i),
-                ChannelKind::ValveFlow(i) => of(through, i),
-                ChannelKind::Angle(i) => of(angles, i),
-                ChannelKind::Spill(i) => of(spills, i),
-                ChannelKind::Setpoint(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.setpoint_cm),
-                ChannelKind::Pv(i) => {
-                    self.loops.get(i).map_or(f64::NAN, |l| self.readings[l.sensor].level_cm)
-                }
-                ChannelKind::Mv(i) => self.loops.get(i).map_or(f64::NAN, |l| l.control.mv()),
-            };
+        let (loop_cells, plant_cells) = self.row.split_at_mut(3 * self.channels.slots);
+        loop_cells.fill(f64::NAN);
+        for (cells, active) in loop_cells.chunks_exact_mut(3).zip(&self.loops) {
+            let pv_cm = self.readings[active.sensor].level_cm;
+            cells.copy_from_slice(&[active.control.setpoint_cm, pv_cm, active.control.mv()]);
         }
+        let Some(plant) = self.source.plant() else {
+            plant_cells.fill(f64::NAN);
+            return;
+        };
+        let (tanks, pumps) = (plant.levels_cm().len(), plant.inputs().len());
+        let (levels, rest) = plant_cells.split_at_mut(tanks);
+        let (of_pumps, rest) = rest.split_at_mut(2 * pumps);
+        let (of_valves, spills) = rest.split_at_mut(2 * plant.angles_deg().len());
+        levels.copy_from_slice(plant.levels_cm());
+        pair_up(of_pumps, plant.inputs(), plant.arriving_flows_cm3_s());
+        pair_up(of_valves, plant.valve_flows_cm3_s(), plant.angles_deg());
+        spills.copy_from_slice(plant.spill_flows_cm3_s());
     }
 
     /// Makes the loops of the present configuration at the present outputs. `modes` are those of a configuration
@@ -469,4 +466,11 @@ impl ClosedLoop {
 /// A mode as it is possible in a slot: cascade needs a loop that gives the setpoint.
 fn mode_in(specs: &[LoopSpec], slot: usize, mode: Mode) -> Mode {
     if mode == Mode::Cascade && outer_of(specs, &specs[slot].id).is_none() { Mode::Automatic } else { mode }
+}
+
+/// Two series side by side.
+fn pair_up(cells: &mut [f64], first: &[f64], second: &[f64]) {
+    for (cells, (first, second)) in cells.chunks_exact_mut(2).zip(first.iter().zip(second)) {
+        cells.copy_from_slice(&[*first, *second]);
+    }
 }
