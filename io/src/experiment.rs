@@ -32,7 +32,21 @@ macro_rules! embedded {
 }
 
 /// The experiments, source by source.
-pub const EXPERIMENTS: &[Embedded] = embedded!["stad_figure_7", "simtank_steady_levels", "uff_second_order",];
+pub const EXPERIMENTS: &[Embedded] = embedded![
+    "stad_figure_4",
+    "stad_figure_7",
+    "stad_figure_8",
+    "stad_figure_9",
+    "stad_figure_10",
+    "stad_figure_11",
+    "stad_load_in_range",
+    "stad_amigo_drift",
+    "stad_integrating",
+    "stad_sample_time",
+    "stad_faults",
+    "simtank_steady_levels",
+    "uff_second_order",
+];
 
 /// An experiment of the program by its id.
 ///
