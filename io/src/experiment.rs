@@ -44,6 +44,9 @@ pub const EXPERIMENTS: &[Embedded] = embedded![
     "stad_integrating",
     "stad_sample_time",
     "stad_faults",
+    "simtank_figure_7",
+    "simtank_figure_8",
+    "simtank_figure_10",
     "simtank_steady_levels",
     "uff_second_order",
 ];
