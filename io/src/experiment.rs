@@ -48,7 +48,15 @@ pub const EXPERIMENTS: &[Embedded] = embedded![
     "simtank_figure_8",
     "simtank_figure_10",
     "simtank_steady_levels",
+    "uff_offset",
+    "uff_proportional_band",
+    "uff_pi_load",
+    "uff_ti_repetition",
+    "uff_pd_prediction",
     "uff_second_order",
+    "uff_ki_sweep",
+    "uff_effect_table",
+    "uff_on_off",
 ];
 
 /// An experiment of the program by its id.
