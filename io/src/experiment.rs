@@ -32,7 +32,32 @@ macro_rules! embedded {
 }
 
 /// The experiments, source by source.
-pub const EXPERIMENTS: &[Embedded] = embedded!["stad_figure_7", "simtank_steady_levels", "uff_second_order",];
+pub const EXPERIMENTS: &[Embedded] = embedded![
+    "stad_figure_4",
+    "stad_figure_7",
+    "stad_figure_8",
+    "stad_figure_9",
+    "stad_figure_10",
+    "stad_figure_11",
+    "stad_load_in_range",
+    "stad_amigo_drift",
+    "stad_integrating",
+    "stad_sample_time",
+    "stad_faults",
+    "simtank_figure_7",
+    "simtank_figure_8",
+    "simtank_figure_10",
+    "simtank_steady_levels",
+    "uff_offset",
+    "uff_proportional_band",
+    "uff_pi_load",
+    "uff_ti_repetition",
+    "uff_pd_prediction",
+    "uff_second_order",
+    "uff_ki_sweep",
+    "uff_effect_table",
+    "uff_on_off",
+];
 
 /// An experiment of the program by its id.
 ///
@@ -66,7 +91,7 @@ pub fn parse_experiment(name: &str, text: &str, folder: &Path) -> Result<Experim
     let mut spec: ExperimentSpec = parse(name, text)?;
     let refused = |error| at(name, text, error);
     let mut rigs: BTreeMap<String, Arc<Network>> = BTreeMap::new();
-    for run in &mut spec.runs {
+    for (number, run) in spec.runs.iter_mut().enumerate() {
         if let Some(file) = &run.scenario_file {
             let (scenario, network) = load_scenario(&folder.join(file))?;
             let scenario = ScenarioRun { rig: file.clone(), ..ScenarioRun::of(scenario) };
@@ -75,7 +100,8 @@ pub fn parse_experiment(name: &str, text: &str, folder: &Path) -> Result<Experim
         }
         let rig = run.scenario.as_ref().map(|s| &s.rig).or(run.models.as_ref().map(|m| &m.rig));
         if let Some(rig) = rig.filter(|rig| !rigs.contains_key(*rig)) {
-            rigs.insert(rig.clone(), find_rig(rig, folder)?);
+            let network = find_rig(rig, folder, Place::Run(number), &refused)?;
+            rigs.insert(rig.clone(), network);
         }
     }
     spec.runs = unrolled(spec.runs).map_err(refused)?;
@@ -96,11 +122,21 @@ fn at(name: &str, text: &str, error: ExperimentError) -> FileError {
     FileError::Experiment { name: name.to_owned(), line: line_of(text, &error), error: Box::new(error) }
 }
 
-fn find_rig(rig: &str, folder: &Path) -> Result<Arc<Network>, FileError> {
+fn find_rig(
+    rig: &str,
+    folder: &Path,
+    place: Place,
+    refused: &dyn Fn(ExperimentError) -> FileError,
+) -> Result<Arc<Network>, FileError> {
     if PRESETS.iter().any(|p| p.id == rig) {
         return preset(rig);
     }
-    load_rig(&folder.join(rig).display().to_string())
+    let beside = folder.join(rig);
+    if !beside.is_file() {
+        let presets = PRESETS.map(|p| p.id).join(", ");
+        return Err(refused(ExperimentError::UnknownRig { rig: rig.to_owned(), presets, place }));
+    }
+    load_rig(&beside.display().to_string())
 }
 
 /// Each run of a sweep in its place.

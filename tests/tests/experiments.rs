@@ -139,6 +139,12 @@ fn errors_name_the_line_and_what_was_expected() {
         ("inputs.BA01\"", "inputs.BA07\"", "[[run]]", "cannot be swept over scenario.start.inputs.BA07"),
         ("sweep = \"q\"", "sweep = \"p\"", "[[table]]", "there is no run p; there are q"),
         ("id = \"rest\"", "id = \"q_20\"", "[[table]]", "'q_20' is not possible as an id"),
+        (
+            "rig = \"simtank1\"",
+            "rig = \"simtank9\"",
+            "[[run]]",
+            "there is no rig simtank9: name a preset (stad, ",
+        ),
         ("keep_every = 10", "keep_evry = 10", "keep_evry", "unknown field `keep_evry`"),
     ];
     for (from, to, on, says) in cases {

@@ -122,6 +122,16 @@ pub enum ExperimentError {
         /// What refers to it.
         place: Place,
     },
+    /// A rig that is neither a preset nor a file.
+    #[error("there is no rig {rig}: name a preset ({presets}) or a rig file beside this one")]
+    UnknownRig {
+        /// Rig as written.
+        rig: String,
+        /// Presets there are.
+        presets: String,
+        /// The run.
+        place: Place,
+    },
     /// A column that is not there.
     #[error("the run {run} has no column {column}; it has {columns}")]
     UnknownColumn {
@@ -187,6 +197,7 @@ impl ExperimentError {
             Self::Id { place, .. }
             | Self::Kind { place, .. }
             | Self::UnknownRun { place, .. }
+            | Self::UnknownRig { place, .. }
             | Self::UnknownColumn { place, .. }
             | Self::Expectation { place }
             | Self::Sweep { place, .. }
@@ -206,6 +217,7 @@ impl ExperimentError {
             Self::Id { id: text("a b"), place },
             Self::Kind { run: text("a"), count: 2, place },
             Self::UnknownRun { run: text("b"), runs: text("a"), place },
+            Self::UnknownRig { rig: text("std"), presets: text("stad, simtank1"), place },
             Self::UnknownColumn { run: text("a"), column: text("h9_cm"), columns: text("pv, mv"), place },
             Self::Expectation { place },
             Self::Sweep { run: text("a"), parameter: text("loop.gains.kq"), place },
@@ -223,6 +235,7 @@ impl Explain for ExperimentError {
             Self::Id { .. } => "experiment.id",
             Self::Kind { .. } => "experiment.kind",
             Self::UnknownRun { .. } => "experiment.unknown_run",
+            Self::UnknownRig { .. } => "experiment.unknown_rig",
             Self::UnknownColumn { .. } => "experiment.unknown_column",
             Self::Expectation { .. } => "experiment.expectation",
             Self::Sweep { .. } => "experiment.sweep",
@@ -238,6 +251,9 @@ impl Explain for ExperimentError {
             Self::Id { id, .. } => vec![("id", id.clone())],
             Self::Kind { run, count, .. } => vec![("run", run.clone()), ("count", count.to_string())],
             Self::UnknownRun { run, runs, .. } => vec![("run", run.clone()), ("runs", runs.clone())],
+            Self::UnknownRig { rig, presets, .. } => {
+                vec![("rig", rig.clone()), ("presets", presets.clone())]
+            }
             Self::UnknownColumn { run, column, columns, .. } => {
                 vec![("run", run.clone()), ("column", column.clone()), ("columns", columns.clone())]
             }

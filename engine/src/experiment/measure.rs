@@ -102,8 +102,15 @@ pub enum Measure {
     Mse { run: String, column: String, against: String, from: Option<f64>, to: Option<f64> },
     /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖), `column` ŷ and `against` y.
     Fit { run: String, column: String, against: String, from: Option<f64>, to: Option<f64> },
-    /// Largest difference to the same column of another run with the same axis.
-    Distance { run: String, column: String, other: String, from: Option<f64>, to: Option<f64> },
+    /// Largest difference to a column of another run with the same axis; `against` absent: the same column.
+    Distance {
+        run: String,
+        column: String,
+        other: String,
+        against: Option<String>,
+        from: Option<f64>,
+        to: Option<f64>,
+    },
 }
 
 /// Slack for times that are products of a sample time.
@@ -152,9 +159,9 @@ impl Measure {
         }
     }
 
-    /// Columns of [`Self::run`] that it looks at.
+    /// Columns that it looks at, each with the id of its run.
     #[must_use]
-    pub fn columns(&self) -> Vec<String> {
+    pub fn columns(&self) -> Vec<(&str, String)> {
         match self {
             Self::Value { column, .. }
             | Self::End { column, .. }
@@ -169,12 +176,14 @@ impl Measure {
             | Self::Reaches { column, .. }
             | Self::Crossings { column, .. }
             | Self::Share { column, .. }
-            | Self::Overflows { column, .. }
-            | Self::Distance { column, .. } => vec![column.clone()],
-            Self::Mse { column, against, .. } | Self::Fit { column, against, .. } => {
-                vec![column.clone(), against.clone()]
+            | Self::Overflows { column, .. } => vec![(self.run(), column.clone())],
+            Self::Distance { run, column, other, against, .. } => {
+                vec![(run, column.clone()), (other, against.as_ref().unwrap_or(column).clone())]
             }
-            Self::Figure { slot, .. } => loop_columns(*slot).to_vec(),
+            Self::Mse { column, against, .. } | Self::Fit { column, against, .. } => {
+                vec![(self.run(), column.clone()), (self.run(), against.clone())]
+            }
+            Self::Figure { slot, .. } => loop_columns(*slot).map(|name| (self.run(), name)).to_vec(),
         }
     }
 
@@ -222,16 +231,16 @@ impl Measure {
             }
             Self::Mse { column: model, against, .. } => Some(agreement(column(against)?, column(model)?).0),
             Self::Fit { column: model, against, .. } => agreement(column(against)?, column(model)?).1,
-            Self::Distance { column: name, .. } => {
+            Self::Distance { column: name, against, .. } => {
                 let other = other?;
                 let across = rows(&other.x, self.window())?;
-                let theirs = &other.column(name)?[across.first..across.end];
+                let theirs = &other.column(against.as_ref().unwrap_or(name))?[across.first..across.end];
                 let ours = column(name)?;
                 let same = other.x[across.first..across.end].iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-6);
                 (same && theirs.len() == ours.len())
                     .then(|| ours.iter().zip(theirs).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())))
             }
-            _ => self.of_column(x, column(&self.columns()[0])?),
+            _ => self.of_column(x, column(&self.columns().first()?.1)?),
         }
     }
 

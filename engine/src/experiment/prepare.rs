@@ -96,8 +96,8 @@ fn check_run(
     }
     let rig = run.scenario.as_ref().map(|s| &s.rig).or(run.models.as_ref().map(|m| &m.rig));
     if let Some(rig) = rig.filter(|rig| !rigs.contains_key(*rig)) {
-        let known = rigs.keys().cloned().collect::<Vec<_>>().join(", ");
-        return Err(ExperimentError::UnknownRun { run: rig.clone(), runs: known, place });
+        let presets = rigs.keys().cloned().collect::<Vec<_>>().join(", ");
+        return Err(ExperimentError::UnknownRig { rig: rig.clone(), presets, place });
     }
     let demand = |field, value: f64, ok: bool, expected| {
         if ok { Ok(()) } else { Err(ExperimentError::Value { field, value, expected, place }) }
@@ -106,6 +106,8 @@ fn check_run(
         let (h, length) = (run.sample_time_s, run.duration_s);
         demand("sample_time_s", h, h > 0.0 && h.is_finite(), "> 0")?;
         demand("duration_s", length, length >= 0.0 && length / h <= MOST_SAMPLES, "0 to 10⁷ samples")?;
+        let dead_time_s = run.process.dead_time_s();
+        demand("dead_time_s", dead_time_s, dead_time_s / h <= MOST_SAMPLES, "0 to 10⁷ samples")?;
         let starts = run.setpoint.is_finite() && run.mv.is_finite();
         demand("setpoint", run.setpoint, starts, "finite, and mv too")?;
         for event in &run.events {

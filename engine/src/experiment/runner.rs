@@ -115,7 +115,9 @@ fn draw(
         let mut values = vec![0.0; members.len()];
         for term in &column.sum {
             for (value, (_, run)) in values.iter_mut().zip(&members) {
-                look_in(&term.measure, run, place)?;
+                for (_, column) in term.measure.columns() {
+                    look_in(run, column, place)?;
+                }
                 *value += term.factor * term.measure.of(run, None).unwrap_or(f64::NAN);
             }
         }
@@ -138,17 +140,16 @@ fn find<'a>(id: &str, runs: &'a [RunResult]) -> Option<&'a RunResult> {
 
 /// Refuses a measure of a column that is not there.
 fn look_up(measure: &Measure, runs: &[RunResult], place: Place) -> Result<(), ExperimentError> {
-    measure.runs().into_iter().filter_map(|id| find(id, runs)).try_for_each(|r| look_in(measure, r, place))
+    let columns = measure.columns().into_iter().filter_map(|(id, column)| Some((find(id, runs)?, column)));
+    columns.into_iter().try_for_each(|(run, column)| look_in(run, column, place))
 }
 
-fn look_in(measure: &Measure, run: &RunResult, place: Place) -> Result<(), ExperimentError> {
-    match measure.columns().into_iter().find(|name| run.column(name).is_none()) {
-        None => Ok(()),
-        Some(column) => {
-            let columns = run.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-            Err(ExperimentError::UnknownColumn { run: run.id.clone(), column, columns, place })
-        }
+fn look_in(run: &RunResult, column: String, place: Place) -> Result<(), ExperimentError> {
+    if run.column(&column).is_some() {
+        return Ok(());
     }
+    let columns = run.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+    Err(ExperimentError::UnknownColumn { run: run.id.clone(), column, columns, place })
 }
 
 /// The number of a measure.
