@@ -15,7 +15,7 @@ use crate::{i18n, plots, text, theme, tr};
 /// Width from which the list stands beside the experiment.
 const WIDE: f32 = 640.0;
 /// Width of the list.
-const LIST: f32 = 230.0;
+const LIST: f32 = 300.0;
 /// Most points drawn of a curve; more than any screen has columns.
 const POINTS: usize = 4000;
 /// Most curves of one plot.
@@ -35,7 +35,8 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     if ui.available_width() >= WIDE {
         let rest = ui.available_size();
         ui.horizontal_top(|ui| {
-            ui.allocate_ui(egui::vec2(LIST, rest.y), |ui| list(ui, desk, &mut actions));
+            let down = egui::Layout::top_down_justified(egui::Align::Min);
+            ui.allocate_ui_with_layout(egui::vec2(LIST, rest.y), down, |ui| list(ui, desk, &mut actions));
             ui.separator();
             ui.vertical(|ui| body(ui, desk, state, &mut actions));
         });
@@ -75,13 +76,15 @@ fn entries(ui: &mut egui::Ui, desk: &Desk, actions: &mut Vec<Action>) {
             Some(false) => (tr!("experiments.not"), p.alarm),
             None => (String::new(), p.weak),
         };
+        let chosen = desk.chosen == *id;
+        let (colour, ink) = if chosen { (p.on_accent, p.on_accent) } else { (colour, p.text) };
         let mut job = egui::text::LayoutJob::default();
         let format = |font, color| egui::TextFormat { font_id: font, color, ..Default::default() };
         if !mark.is_empty() {
             job.append(&format!("{mark}  "), 0.0, format(theme::bold_font(theme::TABLE), colour));
         }
-        job.append(&title(experiment), 0.0, format(egui::FontId::proportional(theme::TABLE), p.text));
-        if ui.selectable_label(desk.chosen == *id, job).clicked() {
+        job.append(&title(experiment), 0.0, format(egui::FontId::proportional(theme::TABLE), ink));
+        if ui.selectable_label(chosen, job).clicked() {
             actions.push(Action::ChooseExperiment(id.clone()));
         }
     }
@@ -162,7 +165,7 @@ fn points(run: &RunResult, values: &[f64]) -> PlotPoints<'static> {
 
 fn plot(ui: &mut egui::Ui, state: &mut State, run: &Arc<ExperimentRun>) {
     let names = columns(run);
-    let preferred = ["pv", "pv1", "y"];
+    let preferred = ["pv", "pv1", "y", "recording"];
     let first = preferred.iter().find_map(|p| names.iter().find(|(name, _)| name == p)).or(names.first());
     let Some((first, _)) = first else { return };
     if !names.iter().any(|(name, _)| *name == state.column) {
@@ -195,6 +198,14 @@ fn plot(ui: &mut egui::Ui, state: &mut State, run: &Arc<ExperimentRun>) {
         .x_grid_spacer(plots::x_marks)
         .y_grid_spacer(plots::y_marks)
         .show(ui, |plot| {
+            if let [only] = with[..] {
+                // Of a single run, everything of the same unit belongs together.
+                for (i, column) in only.columns.iter().filter(|c| c.unit == unit).take(CURVES).enumerate() {
+                    let line = Line::new(column.name.clone(), points(only, &column.values));
+                    plot.line(line.color(theme::series(&p, i)).width(theme::TREND_LINE));
+                }
+                return;
+            }
             for (i, result) in with.iter().enumerate().filter(|(_, r)| r.x_name == axis.x_name) {
                 let Some(values) = result.column(&state.column) else { continue };
                 let line = Line::new(result.label.get(language()).to_owned(), points(result, values));

@@ -1,7 +1,9 @@
 //! The faceplate of a loop: PV, SP and MV on bars, mode, keys, tuning in use, alarms.
 
+mod tuning;
+
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Role, Sense, Stroke, WidgetInfo, pos2, vec2};
-use vasos_engine::control::{Action as Direction, AntiWindup, Clip, Form, FormGains, Law, Mode, Sends};
+use vasos_engine::control::{Form, Mode};
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::{LoopNow, RigCommand};
 use vasos_engine::sim::LoopTarget;
@@ -9,13 +11,20 @@ use vasos_engine::sim::LoopTarget;
 use crate::action::Action;
 use crate::panes::View;
 use crate::widgets::segmented;
-use crate::{i18n, text, theme, tr};
+use crate::{text, theme, tr};
 
 /// State of the pane.
-#[derive(Default)]
 pub struct State {
     /// The loop in view: what is identified, compared and tuned is this one.
     pub shown: usize,
+    /// Form in which its gains are shown and typed.
+    form: Form,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self { shown: 0, form: Form::Ideal }
+    }
 }
 
 /// Draws the pane.
@@ -33,7 +42,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         heading(ui, view, state, now, &mut actions);
         bars(ui, view, now);
         setpoint_keys(ui, view, now, &mut actions);
-        tuning(ui, view, now, &mut actions);
+        tuning::ui(ui, view, state, now, &mut actions);
         alarms(ui, view, now);
     });
     actions
@@ -176,142 +185,6 @@ fn setpoint_keys(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Ve
             }
         }
     });
-}
-
-/// The law with its choice, its direction, and what is on around it.
-fn law(ui: &mut egui::Ui, now: &LoopNow, actions: &mut Vec<Action>) {
-    let direction = match now.action {
-        Direction::Reverse => tr!("faceplate.reverse"),
-        Direction::Direct => tr!("faceplate.direct"),
-    };
-    let name = law_name(&now.law);
-    ui.horizontal(|ui| {
-        let combo =
-            egui::ComboBox::from_id_salt("law").width(84.0).selected_text(egui::RichText::new(&name).small());
-        let combo = combo.show_ui(ui, |ui| {
-            let laws = [
-                Law::default(),
-                Law::PidI2gl { clip: Clip::Integral, sends: Sends::Position },
-                Law::Pid2gl { bias: None, anti_windup: AntiWindup::Clamping },
-                Law::Pid2gl { bias: None, anti_windup: AntiWindup::BackCalculation { tracking_s: None } },
-                Law::OnOff { gap_cm: 0.5, action: now.action },
-            ];
-            for law in laws {
-                if ui.selectable_label(now.law == law, law_name(&law)).clicked() && now.law != law {
-                    actions.push(Action::Document(DocumentCommand::Law(now.tag.clone(), law)));
-                }
-            }
-        });
-        combo.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, tr!("faceplate.law")));
-        combo.response.on_hover_text(parts(now));
-        ui.label(egui::RichText::new(direction).small());
-    });
-    if let Law::OnOff { mut gap_cm, action } = now.law {
-        ui.horizontal(|ui| {
-            let name = ui.label(tr!("faceplate.gap"));
-            let field = egui::DragValue::new(&mut gap_cm).range(0.0..=10.0).speed(0.01).suffix(" cm");
-            if ui.add(field).labelled_by(name.id).changed() {
-                let law = Law::OnOff { gap_cm, action };
-                actions.push(Action::Document(DocumentCommand::Law(now.tag.clone(), law)));
-            }
-        });
-    }
-}
-
-fn law_name(law: &Law) -> String {
-    match law {
-        Law::PidI2gl { clip: Clip::Output, .. } => "PID-I2GL".to_owned(),
-        Law::PidI2gl { clip: Clip::Integral, .. } => tr!("law.i2gl_integral"),
-        Law::Pid2gl { anti_windup: AntiWindup::Clamping, .. } => "PID-2GL".to_owned(),
-        Law::Pid2gl { anti_windup: AntiWindup::BackCalculation { .. }, .. } => tr!("law.pid_2gl_back"),
-        Law::OnOff { .. } => tr!("law.on_off"),
-    }
-}
-
-/// What the law came to in the last sample, and the gains in the other forms.
-fn parts(now: &LoopNow) -> String {
-    let last = now.last.parts;
-    let number = |v: f64| text::fixed(v, 5);
-    let mut words = tr!("faceplate.parts", p = number(last.p), i = number(last.i), d = number(last.d));
-    let gains = FormGains::Ideal(now.tuning_now.gains);
-    for form in [Form::Parallel, Form::Series] {
-        words.push('\n');
-        words.push_str(&match gains.to_form(form) {
-            Ok(FormGains::Parallel(g)) => {
-                tr!(
-                    "faceplate.parallel",
-                    kp = text::brief(g.kp),
-                    ki = text::brief(g.ki),
-                    kd = text::brief(g.kd)
-                )
-            }
-            Ok(FormGains::Series(g)) => {
-                tr!(
-                    "faceplate.series",
-                    kc = text::brief(g.kc),
-                    ti = text::brief(g.ti_s),
-                    td = text::brief(g.td_s)
-                )
-            }
-            Ok(FormGains::Ideal(_)) => String::new(),
-            Err(error) => i18n::say(&error),
-        });
-    }
-    words
-}
-
-fn tuning(ui: &mut egui::Ui, view: &View, now: &LoopNow, actions: &mut Vec<Action>) {
-    let Some(settings) = view.document.rig.loops.get(&now.tag) else { return };
-    let unit = mv_unit(view, now);
-    law(ui, now, actions);
-    if !settings.law.is_pid() {
-        return;
-    }
-    let gains = settings.tuning.gains;
-    let mut edited = settings.tuning;
-    let mut filter_s = settings.pv_filter_s;
-    let width = ((ui.available_width() - 72.0) / 2.0).clamp(48.0, 84.0);
-    let mut changed = false;
-    let mut filter_changed = false;
-    let mut done = false;
-    ui.style_mut().drag_value_text_style = egui::TextStyle::Small;
-    egui::Grid::new("tuning").min_col_width(14.0).num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
-        let mut field =
-            |ui: &mut egui::Ui, name: &str, hint: String, value: &mut f64, suffix: String, speed: f64| {
-                let name = ui.label(name).on_hover_text(&hint);
-                let drag = egui::DragValue::new(value).speed(speed).max_decimals(3).suffix(suffix);
-                let response = ui.add_sized([width, 20.0], drag).labelled_by(name.id).on_hover_text(hint);
-                done |= response.drag_stopped() || response.lost_focus();
-                response.changed()
-            };
-        let speed = |v: f64| (v.abs() / 100.0).max(0.001);
-        changed |= field(
-            ui,
-            "Kc",
-            tr!("gain.kc"),
-            &mut edited.gains.kc,
-            format!(" {}", text::quotient(unit, "cm")),
-            speed(gains.kc),
-        );
-        changed |=
-            field(ui, "Ti", tr!("gain.ti"), &mut edited.gains.ti_s, " s".to_owned(), speed(gains.ti_s));
-        ui.end_row();
-        changed |= field(ui, "Td", tr!("gain.td"), &mut edited.gains.td_s, " s".to_owned(), 0.01);
-        changed |= field(ui, "N", tr!("gain.n"), &mut edited.gains.n, String::new(), 0.1);
-        ui.end_row();
-        changed |= field(ui, "b", tr!("gain.b"), &mut edited.b, String::new(), 0.01);
-        filter_changed |= field(ui, "Tf", tr!("gain.pv_filter"), &mut filter_s, " s".to_owned(), 0.02);
-        ui.end_row();
-    });
-    if changed {
-        actions.push(Action::Document(DocumentCommand::Tuning(now.tag.clone(), edited)));
-    }
-    if filter_changed {
-        actions.push(Action::Document(DocumentCommand::PvFilter(now.tag.clone(), filter_s)));
-    }
-    if done {
-        actions.push(Action::Seal);
-    }
 }
 
 fn alarms(ui: &mut egui::Ui, view: &View, now: &LoopNow) {
