@@ -171,6 +171,30 @@ fn a_power_cut_stops_the_pump_and_takes_the_sensors_current_away() {
     assert!(closed.readings()[0].status == ReadingStatus::Good);
 }
 
+/// While the wire is broken the output is held; when the PV is back, elsewhere, only the integral moves it.
+#[test]
+fn a_mended_wire_brings_no_jump() {
+    for law in ["pid_i2gl", "pid_2gl"] {
+        let mut closed = loop_at_rest();
+        run(&mut closed, 5);
+        let law = toml::from_str(&format!("kind = \"{law}\"")).expect("a law");
+        closed.apply(&RigCommand::Law { tag: "LIC-02".to_owned(), law }).expect("possible");
+        run(&mut closed, 5);
+        closed.apply(&fault("LT02", Fault::BrokenWire)).expect("possible");
+        closed.apply(&RigCommand::Valve { tag: "FV01".to_owned(), angle_deg: 28.0 }).expect("possible");
+        run(&mut closed, 500);
+        let held = closed.loops()[0].control.mv();
+        closed.apply(&repair("LT02")).expect("broken");
+        run(&mut closed, 1);
+        let now = &closed.loops()[0].control;
+        let error_cm = now.setpoint_cm - closed.readings()[0].level_cm;
+        assert!(error_cm.abs() > 2.0, "the level has moved: {error_cm} cm");
+        let gains = now.tuning().gains;
+        let integral = gains.kc * 0.2 / gains.ti_s * error_cm;
+        assert!((now.mv() - held - integral).abs() < 1e-12, "{} V, integral {integral} V", now.mv() - held);
+    }
+}
+
 #[test]
 fn what_cannot_break_that_way_is_refused_in_words() {
     let mut closed = loop_at_rest();

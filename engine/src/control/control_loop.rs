@@ -264,6 +264,11 @@ impl ControlLoop {
     /// One sample.
     pub fn update(&mut self, input: &LoopInput) -> &ControlOutput {
         self.actual = input.actual;
+        if self.last.held && input.pv_cm.is_finite() {
+            // The PV is back, somewhere else perhaps: what it did meanwhile is nothing to answer with a jump.
+            self.filtered_pv = None;
+            self.running.rebase();
+        }
         let level_cm = self.filter(input.pv_cm);
         let remote = input.actual == Mode::Cascade;
         let setpoint = self.lead_setpoint(remote);

@@ -15,10 +15,12 @@ use super::pipe::Pipe;
 use super::streams::Streams;
 
 /// Largest λ·h of a step, well inside the stability region of the method (2.78).
-const STEP_RATE: f64 = 0.4;
+pub(super) const STEP_RATE: f64 = 0.4;
 /// Largest change of a head within a step, as a share of √(δ² + head²). It resolves the kink of the √ law at equal
 /// levels, and fast transients with it.
-const STEP_CURVATURE: f64 = 0.1;
+pub(super) const STEP_CURVATURE: f64 = 0.1;
+/// Largest (λ·h)⁴ times the change of a head within a step, in cm: what the method's error is a small share of.
+pub(super) const STEP_ERROR_CM: f64 = 1e-4;
 /// Most pieces a step is cut into where δ = 0 makes the slope infinite.
 const MOST_PIECES: f64 = 64.0;
 /// Time below which nothing is left to do, in seconds.
@@ -46,6 +48,8 @@ pub(crate) struct Motion<const N: usize, V> {
     tanks: usize,
     heights: [V; N],
     areas: [V; N],
+    /// Node that takes each tank's spill.
+    spills_to: Vec<usize>,
     /// Levels of the nodes where the step began, and where it ends: the state of the integrator.
     pub(super) start: [V; N],
     pub end: [V; N],
@@ -133,6 +137,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
             tanks,
             heights,
             areas,
+            spills_to: network.tanks.iter().map(|t| t.spills_to.unwrap_or(outside)).collect(),
             start: zero,
             end: zero,
             start_slope: zero,
@@ -266,7 +271,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
 
     /// Length of a step of at most `most_s` that resolves every stream from `start`.
     pub(super) fn length_for(&self, most_s: f64, most_pieces: f64) -> f64 {
-        let pieces = self.streams.pieces(&self.start, &self.start_slope, most_s, STEP_RATE, STEP_CURVATURE);
+        let pieces = self.streams.pieces(&self.start, &self.start_slope, most_s);
         if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(most_pieces) } else { most_s }
     }
 
@@ -303,11 +308,21 @@ impl<const N: usize, V: Number> Motion<N, V> {
         self.streams.move_volumes(&self.volume, &mut self.end);
     }
 
-    /// A tank at its rim stays there while more comes in than leaves.
+    /// A tank at its rim stays there while more comes in than leaves; the rest is handed on to where it spills to,
+    /// which may be at its rim as well.
     pub(super) fn hold_at_rims(&self, levels: &[V; N], slope: &mut [V; N]) {
-        for i in 0..self.tanks {
-            if (levels[i] - self.heights[i]).largest() >= 0.0 && slope[i].largest() > 0.0 {
-                slope[i] = V::of(0.0);
+        for _ in 0..self.tanks {
+            let mut handed = false;
+            for i in 0..self.tanks {
+                if (levels[i] - self.heights[i]).largest() >= 0.0 && slope[i].largest() > 0.0 {
+                    let to = self.spills_to[i];
+                    slope[to] += slope[i] * self.areas[i] * self.streams.per_area[to];
+                    slope[i] = V::of(0.0);
+                    handed = true;
+                }
+            }
+            if !handed {
+                return;
             }
         }
     }

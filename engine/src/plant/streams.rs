@@ -5,6 +5,7 @@
 //! length `N`, a power of two with room for each of them, so that the compiler knows it.
 
 use super::lanes::Number;
+use super::motion::{STEP_CURVATURE, STEP_ERROR_CM, STEP_RATE};
 use super::network::Network;
 use super::spec::{ValveDrive, ValveLaw};
 
@@ -234,12 +235,15 @@ impl<const N: usize, V: Number> Streams<N, V> {
         }
     }
 
-    /// How many pieces a step of `step_s` must be cut into, so that no head changes by more than `curvature` of
-    /// √(δ² + head²) and no rate times the step is above `rate`; 1 when it needs no cut.
+    /// How many pieces a step of `step_s` must be cut into so that every stream is resolved; 1 when it needs no cut.
+    ///
+    /// No head changes by more than [`STEP_CURVATURE`] of √(δ² + head²), no rate times the step is above [`STEP_RATE`],
+    /// and where both are within their bounds, their product stays below [`STEP_ERROR_CM`].
     #[inline(always)]
-    pub fn pieces(&self, levels: &[V; N], slope: &[V; N], step_s: f64, rate: f64, curvature: f64) -> f64 {
+    pub fn pieces(&self, levels: &[V; N], slope: &[V; N], step_s: f64) -> f64 {
         let mut worst = 1.0_f64;
-        let (bend2, rate4) = (V::of(curvature * curvature), V::of(rate.powi(4)));
+        let bend2 = V::of(STEP_CURVATURE * STEP_CURVATURE);
+        let (rate4, error2) = (V::of(STEP_RATE.powi(4)), V::of(STEP_ERROR_CM * STEP_ERROR_CM));
         for stream in &self.streams {
             let (from, against) = (stream.from & (N - 1), stream.against & (N - 1));
             let head = levels[from] - levels[against];
@@ -247,18 +251,25 @@ impl<const N: usize, V: Number> Streams<N, V> {
             let r2 = head * head + V::of(self.delta2);
             let change2 = change * change;
             let steepest = stream.k * stream.conductance * step_s;
+            let steepest2 = steepest * steepest;
+            let steepest4 = steepest2 * steepest2;
             if (change2 - bend2 * r2).largest() > 0.0 {
-                worst = worst.max((change2 / r2).largest().sqrt() / curvature);
+                worst = worst.max((change2 / r2).largest().sqrt() / STEP_CURVATURE);
+            }
+            // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
+            let (rated4, scale) = if stream.linear { (steepest4, V::of(1.0)) } else { (steepest4, r2) };
+            if (rated4 * rated4 * change2 - error2 * scale * scale).largest() > 0.0 {
+                let error_cm = ((rated4 * rated4 * change2) / (scale * scale)).largest().sqrt();
+                worst = worst.max((error_cm / STEP_ERROR_CM).powf(0.2));
             }
             if stream.linear {
-                worst = worst.max(steepest.largest() / rate);
+                worst = worst.max(steepest.largest() / STEP_RATE);
                 continue;
             }
-            // dq/dh is at most q/h = k/√r. An empty tank with δ = 0 that stays empty needs no steps for its slope.
-            let steepest2 = steepest * steepest;
-            let steep = (steepest2 * steepest2 - rate4 * r2).largest() > 0.0;
+            // An empty tank with δ = 0 that stays empty needs no steps for its slope.
+            let steep = (steepest4 - rate4 * r2).largest() > 0.0;
             if steep && (self.delta2 > TINY_CM2 || change2.largest() > 0.0) {
-                worst = worst.max((steepest2 / r2.sqrt()).largest().sqrt() / rate);
+                worst = worst.max((steepest2 / r2.sqrt()).largest().sqrt() / STEP_RATE);
             }
         }
         worst

@@ -128,6 +128,8 @@ pub fn vary(network: &Network, spread: Spread, rng: &mut Xoshiro256PlusPlus) -> 
             point[1] *= strength;
         }
     }
+    // All start at the levels of the rig of the file: the water is what these tanks hold then.
+    spec.water_cm3 = None;
     Network::new(spec)
 }
 

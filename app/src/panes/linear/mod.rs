@@ -102,18 +102,18 @@ fn polynomial(coefficients: &[f64]) -> String {
             (false, false) => " + ",
         };
         words.push_str(sign);
-        if c.abs() != 1.0 || power == 0 {
-            words.push_str(&text::brief(c.abs()));
-        }
-        words.push_str(match power {
-            0 => "",
-            1 => " s",
-            2 => " s²",
-            3 => " s³",
-            4 => " s⁴",
-            5 => " s⁵",
-            6 => " s⁶",
-            _ => " sⁿ",
+        let number = if c.abs() == 1.0 { "1".to_owned() } else { text::brief(c.abs()) };
+        let power = match power {
+            0 => String::new(),
+            1 => "s".to_owned(),
+            2 => "s²".to_owned(),
+            3 => "s³".to_owned(),
+            n => format!("s^{n}"),
+        };
+        words.push_str(&match (number.as_str(), power.as_str()) {
+            (_, "") => number,
+            ("1", _) => power,
+            _ => format!("{number} {power}"),
         });
     }
     if words.is_empty() { "0".to_owned() } else { words }
@@ -273,8 +273,9 @@ mod tests {
 
     #[test]
     fn polynomials_are_written_as_people_write_them() {
-        assert_eq!(polynomial(&[2.0, -1.0, 0.0, 1.0]), "2 s³ − 1 s²".replace("1 s²", "s²") + " + 1");
+        assert_eq!(polynomial(&[2.5, -1.0, 0.0, 1.0]), "2.50 s³ − s² + 1");
+        assert_eq!(polynomial(&[1.0, 0.0, 0.0, 0.0, 0.0]), "s^4");
         assert_eq!(polynomial(&[0.0]), "0");
-        assert_eq!(polynomial(&[-3.0]), "−3");
+        assert_eq!(polynomial(&[-3.0]), "−3.00");
     }
 }
