@@ -365,3 +365,38 @@ fn picture(harness: &mut Window, name: &str) {
     let options = egui_kittest::SnapshotOptions::new().threshold(1.5).max_failed_pixels(1500);
     harness.snapshot_options(name, &options);
 }
+
+/// A fault switched in the menu of its part stands on the drawing and in the session, until it is repaired there.
+#[test]
+fn a_fault_is_switched_where_it_is() {
+    let mut harness = window([1440.0, 900.0]);
+    step(&mut harness, 2);
+    harness.get_by_label("Sensor LT02").click();
+    harness.run_steps(3);
+    harness.get_by_label("wire broken").click();
+    harness.run_steps(2);
+    step(&mut harness, 2);
+    let snapshot = harness.state().snapshot();
+    assert_eq!(snapshot.faults.len(), 1, "{:?}", snapshot.faults);
+    assert!(snapshot.loops[0].pv_cm.is_nan() && snapshot.loops[0].last.held);
+    let layout = Layout::of(&snapshot.network);
+    let rect = eframe::egui::Rect::from_min_size(eframe::egui::Pos2::ZERO, eframe::egui::vec2(500.0, 400.0));
+    assert_eq!(PidModel::new(&snapshot, &layout, rect).faults.len(), 1);
+    harness.get_by_label("wire broken").click();
+    harness.run_steps(2);
+    step(&mut harness, 2);
+    assert!(harness.state().snapshot().faults.is_empty());
+    assert!(harness.state().snapshot().loops[0].pv_cm.is_finite());
+}
+
+/// An experiment chosen and run in its pane comes out as its file expects.
+#[test]
+fn an_experiment_runs_beside_the_window() {
+    let mut harness = window([1440.0, 900.0]);
+    act(&mut harness, Action::Maximise(PaneKind::Experiments));
+    act(&mut harness, Action::ChooseExperiment("stad_figure_7".to_owned()));
+    harness.get_by_label("Run").click();
+    wait(&mut harness, "the experiment", |w| w.experiments().results.contains_key("stad_figure_7"));
+    assert!(harness.state().experiments().results["stad_figure_7"].reached());
+    assert!(harness.query_by_label_contains("Reached: all").is_some());
+}

@@ -165,6 +165,12 @@ impl Workbench {
         self.jobs.is_busy()
     }
 
+    /// Experiments and their results.
+    #[must_use]
+    pub fn experiments(&self) -> &Desk {
+        &self.desk
+    }
+
     /// Between frames: fetches samples and events, takes results of jobs, keeps tables up to date. It also runs
     /// while the window is covered.
     pub fn logic(&mut self, ctx: &egui::Context) {
