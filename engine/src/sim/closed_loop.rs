@@ -7,7 +7,7 @@ use crate::control::{LoopSpec, Mode, check_filter, check_loop, execution_order, 
 use crate::daq::{RigControls, SimulatedRig, Source};
 use crate::plant::{
     ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, SteadyState,
-    steady_at_level,
+    SteadyTarget, steady_at_level, steady_at_levels,
 };
 use crate::session::{CommandError, RigCommand};
 use crate::signal::ChannelSet;
@@ -434,19 +434,21 @@ impl ClosedLoop {
 
     /// Solves for the state in which every loop's PV is at its setpoint, and puts the plant there.
     fn settle_all(&mut self) -> Result<(), CommandError> {
-        // Interacting loops are solved in turn; each sweep brings the others' effect in.
-        let sweeps = if self.loops.len() > 1 { 40 } else { 1 };
-        for _ in 0..sweeps {
-            for i in 0..self.loops.len() {
-                let l = &self.loops[i];
-                if !self.decides(i) {
-                    continue;
-                }
-                let state = self.steady(l.pump, l.sensor, l.control.setpoint_cm)?;
-                self.rest(&state)?;
-            }
+        let plant = self.source.plant().ok_or(CommandError::NotARig)?;
+        let deciding = (0..self.loops.len()).filter(|&i| self.decides(i)).map(|i| &self.loops[i]);
+        let targets: Vec<SteadyTarget> = deciding
+            .map(|l| SteadyTarget {
+                pump: l.pump,
+                tank: self.network.sensors[l.sensor].tank,
+                level_cm: l.control.setpoint_cm,
+            })
+            .collect();
+        if targets.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        let (k, inputs, levels) = (plant.coefficients(), plant.inputs(), plant.levels_cm());
+        let state = steady_at_levels(&self.network, k, inputs, levels, &targets)?;
+        self.rest(&state)
     }
 
     /// Whether the setpoint of a loop decides where its pump comes to rest: it is its own, and every loop between
