@@ -2,10 +2,13 @@
 
 use eframe::egui::{Pos2, Rect, pos2, vec2};
 use vasos_engine::plant::{FaultKind, FaultyPart, ReadingStatus};
-use vasos_engine::session::{Alarm, Snapshot};
+use vasos_engine::session::{Alarm, LoopNow, Snapshot};
+use vasos_engine::sim::LoopTarget;
 
 use super::layout::{Frame, Layout, Route};
 
+/// How far an outer loop stands above its inner one, in grid units.
+const OUTER_ABOVE: f32 = 0.42;
 /// Flows smaller than this are drawn as none, in cm³/s.
 pub const STILL_CM3_S: f64 = 0.02;
 
@@ -252,6 +255,19 @@ fn tank(snapshot: &Snapshot, layout: &Layout, frame: &Frame, i: usize) -> TankVi
     }
 }
 
+/// How many loops there are between this one and its pump.
+fn depth(snapshot: &Snapshot, now: &LoopNow) -> usize {
+    let mut target = now.target;
+    let mut depth = 0;
+    while let LoopTarget::Loop(inner) = target
+        && depth < snapshot.loops.len()
+    {
+        target = snapshot.loops[inner].target;
+        depth += 1;
+    }
+    depth
+}
+
 fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<BubbleView>, Vec<Vec<Pos2>>) {
     let spec = &snapshot.network.spec;
     let mut bubbles: Vec<BubbleView> = (0..spec.sensors.len())
@@ -272,7 +288,10 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
         .collect();
     let mut signals = vec![];
     for now in &snapshot.loops {
-        let (sensor, controller) = (layout.sensors[now.sensor], layout.controllers[now.pump]);
+        // The outer loop of a cascade stands above the loop whose setpoint it writes.
+        let above = |depth: usize| layout.controllers[now.pump] - vec2(0.0, OUTER_ABOVE * depth as f32);
+        let depth = depth(snapshot, now);
+        let (sensor, controller) = (layout.sensors[now.sensor], above(depth));
         let pump = layout.pumps[now.pump];
         bubbles.push(BubbleView {
             tag: now.tag.clone(),
@@ -281,6 +300,12 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some() && controller.x < pump.x,
             automatic: Some(now.mode.is_controlling()),
         });
+        if depth > 0 {
+            let corner = pos2(controller.x, sensor.y);
+            let line = [sensor, corner, controller, above(depth - 1)];
+            signals.push(line.into_iter().map(|p| frame.point(p)).collect());
+            continue;
+        }
         let down = snapshot.network.pumps[now.pump].from.is_some();
         let corner = if down { pos2(controller.x, pump.y - 0.06) } else { pos2(controller.x, pump.y - 0.14) };
         let end = pos2(pump.x, corner.y);
