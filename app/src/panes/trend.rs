@@ -5,6 +5,7 @@ use eframe::egui::{self, Color32, Id, Role, WidgetInfo, vec2};
 use egui_plot::{GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotUi, Span, Text, VLine};
 use vasos_engine::document::{DocumentCommand, SourceChoice, Stretch};
 use vasos_engine::signal::{ChannelKind, Pyramid};
+use vasos_engine::sim::LoopTarget;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -156,7 +157,11 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
             thin: other,
         };
         let pv = format!("PV {} [cm]", spec.sensors[now.sensor].id);
-        let mv = format!("MV {} [{unit}]", spec.pumps[now.pump].id);
+        // An outer loop's output is the setpoint of its inner one.
+        let mv = match now.target {
+            LoopTarget::Pump(pump) => format!("MV {} [{unit}]", spec.pumps[pump].id),
+            LoopTarget::Loop(_) => format!("MV {} [cm]", now.tag),
+        };
         if let Some(kept) = view.kept {
             let look = |steps| Look { colour: p.ghost, steps, thin: true };
             let was = tr!("trend.kept");

@@ -1,6 +1,7 @@
 //! What the P&ID shows: the snapshot laid out, ready to paint and to test.
 
 use eframe::egui::{Pos2, Rect, pos2, vec2};
+use vasos_engine::control::Mode;
 use vasos_engine::plant::{FaultKind, FaultyPart, ReadingStatus};
 use vasos_engine::session::{Alarm, LoopNow, Snapshot};
 use vasos_engine::sim::LoopTarget;
@@ -121,6 +122,8 @@ pub struct BubbleView {
     pub mode_on_the_left: bool,
     /// Manual (`Some(false)`), automatic (`Some(true)`), or no controller.
     pub automatic: Option<bool>,
+    /// It takes its setpoint from another loop.
+    pub cascade: bool,
 }
 
 /// The drawing.
@@ -283,6 +286,7 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
                 abnormal: alarmed || now.is_some_and(|l| l.status == ReadingStatus::Broken),
                 mode_on_the_left: false,
                 automatic: None,
+                cascade: false,
             }
         })
         .collect();
@@ -299,6 +303,7 @@ fn instruments(snapshot: &Snapshot, layout: &Layout, frame: &Frame) -> (Vec<Bubb
             abnormal: false,
             mode_on_the_left: snapshot.network.pumps[now.pump].from.is_some() && controller.x < pump.x,
             automatic: Some(now.mode.is_controlling()),
+            cascade: now.mode == Mode::Cascade,
         });
         if depth > 0 {
             let corner = pos2(controller.x, sensor.y);

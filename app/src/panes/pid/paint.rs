@@ -204,7 +204,11 @@ fn bubble(painter: &Painter, view: &BubbleView, radius: f32, p: &Palette) {
         painter.hline(view.at.x - radius..=view.at.x + radius, view.at.y + 0.5, Stroke::new(1.0, p.weak));
     }
     if let Some(automatic) = view.automatic {
-        let words = if automatic { tr!("mode.auto") } else { tr!("mode.manual") };
+        let words = match (automatic, view.cascade) {
+            (_, true) => tr!("mode.cascade"),
+            (true, false) => tr!("mode.auto"),
+            (false, false) => tr!("mode.manual"),
+        };
         let (aside, anchor) =
             if view.mode_on_the_left { (-5.0, Align2::RIGHT_TOP) } else { (5.0, Align2::LEFT_TOP) };
         let at = view.at + vec2(aside, radius + 2.0);
