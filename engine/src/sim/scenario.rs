@@ -5,9 +5,10 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::closed_loop::ClosedLoop;
+use super::scenario_event::ScenarioEvent;
 use crate::explain::{Explain, number};
 use crate::plant::{Measurement, Network, OperatingPoint, RigError};
-use crate::session::{CommandError, RigCommand};
+use crate::session::CommandError;
 use crate::signal::ChannelSet;
 
 /// How a run starts.
@@ -20,16 +21,6 @@ pub struct Start {
     /// Pump inputs by pump tag, in their own units.
     #[serde(default)]
     pub inputs: std::collections::BTreeMap<String, f64>,
-}
-
-/// A command at a time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScenarioEvent {
-    /// Time in seconds; the command acts from the first sample at or after it.
-    pub at_s: f64,
-    /// What happens.
-    #[serde(flatten)]
-    pub command: RigCommand,
 }
 
 /// A prepared run, without the rig it runs on.
