@@ -1,9 +1,11 @@
 //! Events of scenario files: what they do not know is refused, and what is written is read back the same.
 
+use std::sync::Arc;
+
 use vasos_engine::control::{Law, LoopOptions, Mode, PidGains, PidTuning};
-use vasos_engine::plant::{FaultKind, Measurement};
+use vasos_engine::plant::{FaultKind, Measurement, Network};
 use vasos_engine::session::RigCommand;
-use vasos_engine::sim::{Scenario, ScenarioEvent};
+use vasos_engine::sim::{Scenario, ScenarioError, ScenarioEvent, run_scenario};
 
 fn refusal(event: &str) -> toml::de::Error {
     match toml::from_str::<ScenarioEvent>(event) {
@@ -135,4 +137,35 @@ fn a_bad_event_is_found_at_its_line() {
         let error = toml::from_str::<Scenario>(&text).expect_err("must be refused");
         assert_eq!(error.span().map(|s| &text[s]), Some(at), "{error}");
     }
+}
+
+fn small_rig() -> Arc<Network> {
+    let text = include_str!("../../assets/rigs/simtank1.toml");
+    Arc::new(Network::new(toml::from_str(text).expect("a rig")).expect("checked"))
+}
+
+fn scenario(more: &str) -> Scenario {
+    toml::from_str(&format!("schema = 1\nrig = \"simtank1\"\nduration_s = 5.0\n{more}")).expect("a scenario")
+}
+
+#[test]
+fn an_event_before_the_start_ran_at_once_and_one_at_infinity_never() {
+    for at_s in ["-1.0", "-inf", "inf", "nan"] {
+        let event = format!("[[event]]\nat_s = {at_s}\nbump = {{ tag = \"TQ1\", delta_cm = 1.0 }}");
+        let error = run_scenario(small_rig(), &scenario(&event)).expect_err(at_s).to_string();
+        assert!(error.contains("bump: ") && error.contains("a time of 0 s or more"), "{error}");
+    }
+}
+
+#[test]
+fn a_run_that_keeps_every_zeroth_row_kept_all() {
+    let error = run_scenario(small_rig(), &scenario("keep_every = 0")).expect_err("no rows");
+    assert_eq!(error, ScenarioError::Keep);
+}
+
+#[test]
+fn a_refused_event_was_told_by_its_time_alone() {
+    let event = "[[event]]\nat_s = 1\nfault = { tag = \"TQ1\", kind = \"stuck\" }";
+    let error = run_scenario(small_rig(), &scenario(event)).expect_err("no sensor").to_string();
+    assert!(error.starts_with("at 1 s, fault: TQ1 cannot have the fault stuck"), "{error}");
 }
