@@ -216,6 +216,24 @@ fn gains_are_converted_with_their_proof_or_refused_with_1() {
 }
 
 #[test]
+fn gains_beyond_all_numbers_were_converted_with_a_proof_of_0() {
+    for (gains, from, to, word) in
+        [("Kc=1e308,Ti=1e-308", "ideal", "parallel", "Ki"), ("Kc=1e308,Ti=60", "ideal", "ideal", "proved")]
+    {
+        let convert = ["controller", "convert", "--gains", gains, "--from", from, "--to", to];
+        let (status, said) = refused(&convert);
+        assert!(status == 1 && said.contains(word), "{status}: {said}");
+        let (whole, status) = json(&[&convert[..], &["--json"]].concat());
+        assert!(status == 1 && whole["to"].is_null() && whole["reason"].is_string(), "{whole}");
+    }
+    let own = ["--mapping", "base=series,gain=1,integral=/60,derivative=1,filter=1"];
+    for more in [&["--to", "series"][..], &[&["--to", "legacy"], &own[..]].concat()] {
+        let without_integral = ["controller", "convert", "--gains", "Kc=2", "--from", "ideal", "--json"];
+        assert_eq!(json(&[&without_integral, more].concat()).1, 0, "{more:?}");
+    }
+}
+
+#[test]
 fn the_controller_is_written_as_structured_text() {
     let path = scratch("pid.st");
     let st = ["controller", "st", "--gains", "Kc=1.8,Ti=152", "--sample-time", "0.2"];

@@ -22,6 +22,7 @@ pub(crate) fn line_of(text: &str, error: &RigError) -> Option<usize> {
         RigError::Unknown { item, reference } => places.reference(item, reference),
         RigError::Value { item, field, value, .. } => places.value(item, field, *value),
         RigError::Curve { item } => places.field(item, "curve").or_else(|| places.item(item)),
+        RigError::Feedforward { item, from } => places.reference(item, from),
         RigError::Loop { item, tank } => places.reference(item, tank),
         RigError::SharedPump { first, second, .. } => places.shared_pump(first, second),
         RigError::Water { .. } => places.field("", "water_cm3"),

@@ -162,7 +162,7 @@ fn errors_name_the_line_and_what_was_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let cases = [
         ("column = \"h1_spill_cm3_s\"", "column = \"h9\"", "the run q_70 has no column h9; it has sp"),
-        ("tag = \"LIC-01\"", "tag = \"LIC-09\"", "q_20: at 0 s: there is no LIC-09"),
+        ("tag = \"LIC-01\"", "tag = \"LIC-09\"", "q_20: at 0 s, mode: there is no LIC-09"),
     ];
     for (from, to, says) in cases {
         let path = folder.path().join("own.toml");

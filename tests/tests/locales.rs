@@ -200,6 +200,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
     let scenario = vec![
         ScenarioError::Command { at_s: 3.0, error: refused() },
         ScenarioError::Command { at_s: 3.0, error: RigError::NoTank.into() },
+        ScenarioError::Event { at_s: 3.0, command: "fault", error: refused() },
+        ScenarioError::Keep,
         ScenarioError::Length { duration_s: -1.0 },
         ScenarioError::Duration { duration_s: 1e9, sample_time_s: 0.2 },
     ];

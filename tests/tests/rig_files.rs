@@ -183,3 +183,42 @@ fn presets_are_read_before_anybody_notices() {
     println!("{:?}", start.elapsed());
     assert!(start.elapsed().as_millis() < 200, "{:?}", start.elapsed());
 }
+
+#[test]
+fn the_third_number_of_a_pair_was_cut_off() {
+    let stad = PRESETS[0].text;
+    for (from, to) in [
+        ("[1.1, 0]", "[1.1, 0, 1.0]"),
+        ("[1.1, 0]", "[1.1]"),
+        ("at = [1.0, 2.0]", "at = [1.0, 2.0, 3.0]"),
+        ("range_cm = [", "range_cm = [1.0, "),
+    ] {
+        let at = stad.find(from).unwrap_or_else(|| panic!("the preset holds {from}"));
+        let line = stad[..at].matches('\n').count() + 1;
+        let error = parse_rig("stad.toml", &stad.replacen(from, to, 1)).expect_err(to).to_string();
+        assert!(error.starts_with(&format!("stad.toml, line {line}: expected two numbers")), "{error}");
+    }
+}
+
+#[test]
+fn a_feedforward_from_the_loops_own_pump_was_called_unknown() {
+    let with = |from: &str| {
+        let options =
+            format!("[configuration.loop.options]\nfeedforward = {{ from = \"{from}\", gain = 1.0 }}\n");
+        let text = format!("{}\n{options}", PRESETS[0].text.trim_end());
+        parse_rig("stad.toml", &text)
+    };
+    // The last loop of the file is LIC-03 of the sensor LT03, with the pump BA01.
+    for from in ["BA01", "LT03", "FV01", "TQ1", "LIC-03"] {
+        let error = with(from).expect_err(from);
+        let said = error.to_string();
+        let FileError::Rig { error: RigError::Feedforward { item, from: named }, .. } = error else {
+            panic!("{said}");
+        };
+        assert_eq!((item.as_str(), named.as_str()), ("LIC-03", from));
+        assert!(said.contains("takes another sensor or another pump"), "{said}");
+    }
+    let missing = with("LT99").expect_err("no such tag");
+    assert!(matches!(missing, FileError::Rig { error: RigError::Unknown { .. }, .. }), "{missing}");
+    with("LT02").expect("another sensor");
+}

@@ -169,28 +169,61 @@ fn run_convert(arguments: &Convert) -> Result<Answer, Refusal> {
     if let Err(FormError::Gains(error)) = gains.to_ideal() {
         return Err(Refusal::of(error));
     }
-    Ok(match Written::in_way(&gains, &target) {
-        Ok(converted) => converted_answer(arguments.json, &source, &converted, spans),
-        Err(error) => {
+    let converted = Written::in_way(&gains, &target).map_err(|error| error.to_string());
+    let proven = converted.and_then(|converted| Ok((proven(&source, &converted, spans)?, converted)));
+    Ok(match proven {
+        Ok((proof, converted)) => converted_answer(arguments.json, &source, &converted, &proof, spans),
+        Err(reason) => {
             let whole = json!({
                 "from": as_json(&source, spans),
                 "to": Value::Null,
                 "proof": Value::Null,
-                "reason": error.to_string(),
+                "reason": reason,
             });
             let text = if arguments.json { json::text(&whole) } else { String::new() };
-            Answer { text, remarks: vec![error.to_string()], status: 1 }
+            Answer { text, remarks: vec![reason], status: 1 }
         }
     })
 }
 
-fn converted_answer(as_text: bool, source: &Written, converted: &Written, spans: Spans) -> Answer {
+/// The proof of a conversion, or the reason why there is none: a number or an output beyond all numbers. A proof
+/// passes over what is not a number, so the outputs of both sides are asked for.
+fn proven(source: &Written, converted: &Written, spans: Spans) -> Result<Proof, String> {
+    let timed = converted.gains().form() != Form::Parallel;
+    for (name, value) in numbers(converted, spans) {
+        let no_integral = timed && matches!(name, "Ti_s" | "Ti_min" | "integral") && value == f64::INFINITY;
+        if !value.is_finite() && !no_integral {
+            return Err(format!(
+                "the converted {name} = {} is not a finite number: no controller has such gains",
+                number(value)
+            ));
+        }
+    }
     let proof = prove(&source.gains(), &converted.gains());
+    let back = prove(&converted.gains(), &source.gains());
+    for output in [proof.largest_output, back.largest_output] {
+        if !(output.is_finite() && output > 0.0) {
+            return Err(format!(
+                "the conversion cannot be proved: max |u| = {} for errors within ±1; no controller has such gains",
+                number(output)
+            ));
+        }
+    }
+    Ok(proof)
+}
+
+fn converted_answer(
+    as_text: bool,
+    source: &Written,
+    converted: &Written,
+    proof: &Proof,
+    spans: Spans,
+) -> Answer {
     if as_text {
         let whole = json!({
             "from": as_json(source, spans),
             "to": as_json(converted, spans),
-            "proof": proof_json(&proof),
+            "proof": proof_json(proof),
             "reason": Value::Null,
         });
         return Answer::done(json::text(&whole));

@@ -122,9 +122,16 @@ pub fn check_loop(network: &Network, loops: &[LoopSpec], spec: &LoopSpec) -> Res
     spec.law.check(&spec.id, range)?;
     spec.options.check(&spec.id, &spec.law, range)?;
     if let Some(path) = &spec.options.feedforward {
-        let own = network.pump(&path.from).is_some_and(|p| final_pump(network, loops, spec) == Some(p));
-        let known = network.sensor(&path.from).is_some() || network.pump(&path.from).is_some();
-        if own || !known {
+        let (from_sensor, from_pump) = (network.sensor(&path.from), network.pump(&path.from));
+        let own = from_sensor == Some(sensor)
+            || from_pump.is_some_and(|p| final_pump(network, loops, spec) == Some(p));
+        let other_part = network.valve(&path.from).is_some()
+            || network.tank(&path.from).is_some()
+            || loops.iter().any(|l| l.id == path.from);
+        if own || other_part {
+            return Err(RigError::Feedforward { item: spec.id.clone(), from: path.from.clone() });
+        }
+        if from_sensor.is_none() && from_pump.is_none() {
             return Err(unknown(&path.from));
         }
     }

@@ -110,6 +110,16 @@ pub enum RigError {
         /// Tag of the loop.
         item: String,
     },
+    /// A feed-forward from what is no disturbance of the loop.
+    #[error(
+        "the feed-forward of {item} cannot come from {from}: it takes another sensor or another pump than the loop's own"
+    )]
+    Feedforward {
+        /// Tag of the loop.
+        item: String,
+        /// Tag it was to come from.
+        from: String,
+    },
     /// Water that does not fit.
     #[error("the reservoir {tank} would start at {} cm: the tanks hold more than water_cm3 or less than the rim allows", number(*.level_cm))]
     Water {
@@ -167,6 +177,7 @@ impl Explain for RigError {
             Self::Target { .. } => "rig.target",
             Self::CascadeCircle { .. } => "rig.cascade_circle",
             Self::NoOuterLoop { .. } => "rig.no_outer_loop",
+            Self::Feedforward { .. } => "rig.feedforward",
             Self::Water { .. } => "rig.water",
             Self::Unreachable { .. } => "rig.unreachable",
             Self::OutOfReach { .. } => "rig.out_of_reach",
@@ -200,6 +211,7 @@ impl Explain for RigError {
             Self::SharedPump { first, second, pump } => {
                 vec![("first", first.clone()), ("second", second.clone()), ("pump", pump.clone())]
             }
+            Self::Feedforward { item, from } => vec![("item", item.clone()), ("from", from.clone())],
             Self::Water { tank, level_cm } => vec![("tank", tank.clone()), ("level_cm", number(*level_cm))],
             Self::Unreachable { tank, wanted_cm, lowest_cm, highest_cm } => vec![
                 ("tank", tank.clone()),
@@ -238,6 +250,7 @@ impl RigError {
             Self::Target { item: text("LIC-01") },
             Self::CascadeCircle { item: text("LIC-01") },
             Self::NoOuterLoop { item: text("LIC-01") },
+            Self::Feedforward { item: text("LIC-01"), from: text("BA01") },
             Self::Water { tank: text("TQ4"), level_cm: -3.5 },
             Self::Unreachable { tank: text("TQ2"), wanted_cm: 26.0, lowest_cm: 4.4, highest_cm: 20.5 },
             Self::OutOfReach {

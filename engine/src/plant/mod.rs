@@ -24,6 +24,7 @@ mod state;
 mod steady;
 mod steady_solver;
 mod streams;
+mod two_numbers;
 
 pub use error::RigError;
 pub use faults::{ActiveFault, Fault, FaultKind, FaultyPart, check_fault};

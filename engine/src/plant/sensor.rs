@@ -15,6 +15,7 @@ const BROKEN_MA: f64 = 3.6;
 
 /// Which imperfections of measurement and actuation are switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Measurement {
     /// Gaussian noise of the sensors.
     pub noise: bool,

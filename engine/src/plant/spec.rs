@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::two_numbers;
 use crate::control::LoopSpec;
 
 /// A text in one language for all, or one per language tag (`en`, `pt-BR`).
@@ -87,6 +88,7 @@ pub struct TankSpec {
     /// Tank that takes what this one spills; absent: the water is lost to the outside.
     pub spills_to: Option<String>,
     /// Place in the drawing: column and row of the tank's middle, in grid units.
+    #[serde(default, deserialize_with = "two_numbers::optional")]
     pub at: Option<[f64; 2]>,
     /// Width in the drawing, in grid units.
     pub width: Option<f64>,
@@ -123,6 +125,7 @@ pub struct PumpSpec {
     /// Largest change of the input per second; absent: none.
     pub rate_limit: Option<f64>,
     /// Points (input, flow in cm³/s), inputs increasing; linear between, constant outside.
+    #[serde(deserialize_with = "two_numbers::list")]
     pub curve: Vec<[f64; 2]>,
 }
 
@@ -225,6 +228,7 @@ pub struct SensorSpec {
     #[serde(default)]
     pub noise_cm: f64,
     /// Level at 4 mA and at 20 mA in cm; absent: an ideal sensor.
+    #[serde(default, deserialize_with = "two_numbers::optional")]
     pub range_cm: Option<[f64; 2]>,
     /// Smallest difference it tells apart in cm, applied when resolution is switched on.
     #[serde(default)]

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::exact::ExactTuning;
 use crate::control::{GainsError, Law, LoopOptions, Mode, PidTuning};
 use crate::explain::{Explain, number};
 use crate::plant::{Fault, FaultKind, Measurement, RigError};
 
 /// A change of the rig or its loops; scenarios and sessions share it. Items are named by their tags.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RigCommand {
     /// New setpoint of a loop in cm.
     Setpoint {
@@ -36,6 +37,7 @@ pub enum RigCommand {
         /// Loop.
         tag: String,
         /// Gains and weights.
+        #[serde(deserialize_with = "ExactTuning::deserialize")]
         tuning: PidTuning,
     },
     /// Another law of a loop, or other settings of its law; the output goes on from where it is.
@@ -96,6 +98,7 @@ pub enum RigCommand {
         seed: u64,
     },
     /// Breaks something.
+    #[serde(deserialize_with = "super::exact::fault")]
     Fault {
         /// Sensor, valve, tank, pump, or the rig's id.
         tag: String,
@@ -111,6 +114,49 @@ pub enum RigCommand {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         kind: Option<FaultKind>,
     },
+}
+
+impl RigCommand {
+    /// The commands as files name them.
+    pub const KEYS: [&str; 15] = [
+        "setpoint",
+        "mode",
+        "mv",
+        "tuning",
+        "law",
+        "options",
+        "pv_filter",
+        "valve",
+        "bump",
+        "configuration",
+        "steady_at",
+        "measurement",
+        "seed",
+        "fault",
+        "repair",
+    ];
+
+    /// As files name it, one of [`Self::KEYS`].
+    #[must_use]
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::Setpoint { .. } => "setpoint",
+            Self::Mode { .. } => "mode",
+            Self::Mv { .. } => "mv",
+            Self::Tuning { .. } => "tuning",
+            Self::Law { .. } => "law",
+            Self::Options { .. } => "options",
+            Self::PvFilter { .. } => "pv_filter",
+            Self::Valve { .. } => "valve",
+            Self::Bump { .. } => "bump",
+            Self::Configuration { .. } => "configuration",
+            Self::SteadyAt { .. } => "steady_at",
+            Self::Measurement { .. } => "measurement",
+            Self::Seed { .. } => "seed",
+            Self::Fault { .. } => "fault",
+            Self::Repair { .. } => "repair",
+        }
+    }
 }
 
 /// Why a command was not carried out. Nothing has changed then.

@@ -7,6 +7,7 @@
 mod alarms;
 mod command;
 mod event;
+mod exact;
 mod sink;
 mod snapshot;
 mod worker;

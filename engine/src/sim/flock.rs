@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::active_loop::LoopTarget;
 use super::closed_loop::ClosedLoop;
 use super::ensemble::Watch;
-use super::scenario::ScenarioEvent;
+use super::scenario_event::ScenarioEvent;
 use crate::control::{ControlLoop, LoopInput, check_filter};
 use crate::daq::{MISHAPS, convert};
 use crate::plant::{

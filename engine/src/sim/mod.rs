@@ -8,6 +8,7 @@ mod figures;
 mod flock;
 mod real_rig;
 mod scenario;
+mod scenario_event;
 mod start;
 
 pub use active_loop::{ActiveLoop, LoopTarget};
@@ -16,7 +17,6 @@ pub use compare::{CompareError, Comparison, InputSeries, ModelKind, ModelTrace, 
 pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, run_ensemble, vary};
 pub use figures::LoopFigures;
 pub use real_rig::{LevelResistance, record_real_rig};
-pub use scenario::{
-    Run, Scenario, ScenarioError, ScenarioEvent, Start, run_scenario, run_scenario_while, scenario_start,
-};
+pub use scenario::{Run, Scenario, ScenarioError, Start, run_scenario, run_scenario_while, scenario_start};
+pub use scenario_event::ScenarioEvent;
 pub use start::{StartError, check_starts};

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::closed_loop::ClosedLoop;
+use super::scenario_event::ScenarioEvent;
 use crate::explain::{Explain, number};
 use crate::plant::{Measurement, Network, OperatingPoint, RigError};
-use crate::session::{CommandError, RigCommand};
+use crate::session::CommandError;
 use crate::signal::ChannelSet;
 
 /// How a run starts.
@@ -20,16 +21,6 @@ pub struct Start {
     /// Pump inputs by pump tag, in their own units.
     #[serde(default)]
     pub inputs: std::collections::BTreeMap<String, f64>,
-}
-
-/// A command at a time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScenarioEvent {
-    /// Time in seconds; the command acts from the first sample at or after it.
-    pub at_s: f64,
-    /// What happens.
-    #[serde(flatten)]
-    pub command: RigCommand,
 }
 
 /// A prepared run, without the rig it runs on.
@@ -50,7 +41,7 @@ pub struct Scenario {
     /// Noise, quantisation and resolution.
     #[serde(default = "Scenario::default_measurement")]
     pub measurement: Measurement,
-    /// Every how many samples a row is kept.
+    /// Every how many samples a row is kept, 1 or more.
     #[serde(default = "Scenario::default_keep")]
     pub keep_every: u32,
     /// State at the start.
@@ -96,14 +87,27 @@ impl Run {
 /// Why a scenario cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScenarioError {
-    /// The start or an event is refused.
+    /// The start is refused.
     #[error("at {} s: {error}", number(*.at_s))]
     Command {
-        /// Time of the event in seconds.
+        /// Time in seconds.
         at_s: f64,
         /// What was refused.
         error: CommandError,
     },
+    /// An event is refused.
+    #[error("at {} s, {command}: {error}", number(*.at_s))]
+    Event {
+        /// Time of the event in seconds.
+        at_s: f64,
+        /// Its command, as files name it.
+        command: &'static str,
+        /// What was refused.
+        error: CommandError,
+    },
+    /// Rows of which none is kept.
+    #[error("keep_every = 0 keeps no row; it must be 1 or more")]
+    Keep,
     /// A length that is negative or not a number.
     #[error("a run of {} s is not possible: the duration must be 0 s or more", number(*.duration_s))]
     Length {
@@ -124,6 +128,8 @@ impl Explain for ScenarioError {
     fn key(&self) -> &'static str {
         match self {
             Self::Command { .. } => "scenario.command",
+            Self::Event { .. } => "scenario.event",
+            Self::Keep => "scenario.keep",
             Self::Length { .. } => "scenario.length",
             Self::Duration { .. } => "scenario.duration",
         }
@@ -132,6 +138,12 @@ impl Explain for ScenarioError {
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::Command { at_s, error } => vec![("at_s", number(*at_s)), ("error", error.to_string())],
+            Self::Event { at_s, command, error } => vec![
+                ("at_s", number(*at_s)),
+                ("command", (*command).to_owned()),
+                ("error", error.to_string()),
+            ],
+            Self::Keep => vec![],
             Self::Length { duration_s } => vec![("duration_s", number(*duration_s))],
             Self::Duration { duration_s, sample_time_s } => {
                 vec![("duration_s", number(*duration_s)), ("sample_time_s", number(*sample_time_s))]
@@ -141,7 +153,7 @@ impl Explain for ScenarioError {
 
     fn cause(&self) -> Option<&dyn Explain> {
         match self {
-            Self::Command { error, .. } => Some(error),
+            Self::Command { error, .. } | Self::Event { error, .. } => Some(error),
             _ => None,
         }
     }
@@ -160,6 +172,10 @@ pub(super) struct Prepared {
     pub samples: u64,
 }
 
+fn refused(event: &ScenarioEvent, error: CommandError) -> ScenarioError {
+    ScenarioError::Event { at_s: event.at_s, command: event.command.key(), error }
+}
+
 /// Checks a scenario and puts a rig into its starting state.
 pub(super) fn prepare(network: &Arc<Network>, scenario: &Scenario) -> Result<Prepared, ScenarioError> {
     let (duration_s, sample_time_s) = (scenario.duration_s, network.spec.sample_time_s);
@@ -170,10 +186,13 @@ pub(super) fn prepare(network: &Arc<Network>, scenario: &Scenario) -> Result<Pre
     if count > MOST_SAMPLES {
         return Err(ScenarioError::Duration { duration_s, sample_time_s });
     }
-    if let Some(event) = scenario.events.iter().find(|e| e.at_s.is_nan()) {
-        let (item, expected) = ("event".to_owned(), "a time in seconds".to_owned());
+    if scenario.keep_every == 0 {
+        return Err(ScenarioError::Keep);
+    }
+    if let Some(event) = scenario.events.iter().find(|e| !e.at_s.is_finite() || e.at_s < 0.0) {
+        let (item, expected) = ("event".to_owned(), "a time of 0 s or more".to_owned());
         let error = RigError::Value { item, field: "at_s", value: event.at_s, expected };
-        return Err(ScenarioError::Command { at_s: event.at_s, error: error.into() });
+        return Err(refused(event, error.into()));
     }
     let at_start = |error: CommandError| ScenarioError::Command { at_s: 0.0, error };
     let configuration = configuration_index(network, scenario).map_err(at_start)?;
@@ -235,7 +254,7 @@ struct Rows {
 
 impl Rows {
     fn new(scenario: &Scenario) -> Self {
-        Self { keep: u64::from(scenario.keep_every.max(1)), time_s: Vec::new(), values: Vec::new() }
+        Self { keep: u64::from(scenario.keep_every), time_s: Vec::new(), values: Vec::new() }
     }
 
     fn see(&mut self, sample: u64, now_s: f64, row: &[f64]) {
@@ -264,9 +283,7 @@ pub(super) fn run_samples(
     for sample in 0..samples {
         let now_s = closed.time_s();
         while let Some(event) = events.get(used).filter(|e| e.at_s <= now_s + 1e-9) {
-            closed
-                .apply(&event.command)
-                .map_err(|error| ScenarioError::Command { at_s: event.at_s, error })?;
+            closed.apply(&event.command).map_err(|error| refused(event, error))?;
             used += 1;
         }
         see(sample, now_s, closed.step());
