@@ -1,17 +1,36 @@
 //! Pairs of numbers in files. An array alone takes the first two of a longer list without a word.
 
-use serde::de::Error;
+use std::fmt;
+
+use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 struct TwoNumbers([f64; 2]);
 
 impl<'de> Deserialize<'de> for TwoNumbers {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let numbers = Vec::<f64>::deserialize(from)?;
-        let pair = <[f64; 2]>::try_from(numbers);
+        from.deserialize_seq(PairVisitor)
+    }
+}
+
+/// Refuses within the list, so that the error points at this pair and not at the list of pairs.
+struct PairVisitor;
+
+impl<'de> Visitor<'de> for PairVisitor {
+    type Value = TwoNumbers;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("two numbers")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<TwoNumbers, A::Error> {
+        let mut numbers = Vec::with_capacity(2);
+        while let Some(number) = list.next_element::<f64>()? {
+            numbers.push(number);
+        }
         let wrong =
-            |found: Vec<f64>| D::Error::custom(format!("expected two numbers, found {}", found.len()));
-        pair.map(Self).map_err(wrong)
+            |found: Vec<f64>| A::Error::custom(format!("expected two numbers, found {}", found.len()));
+        <[f64; 2]>::try_from(numbers).map(TwoNumbers).map_err(wrong)
     }
 }
 
