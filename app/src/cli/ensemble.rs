@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use vasos_engine::plant::Network;
-use vasos_engine::sim::{EnsembleRun, MemberFigures, Scenario, Spread, run_ensemble};
+use vasos_engine::sim::{EnsembleRun, MemberFigures, Scenario, Spread, quantile, run_ensemble};
 
 use super::json::{self, shown, table};
 use super::{Answer, Refusal};
@@ -13,11 +13,7 @@ use super::{Answer, Refusal};
 fn spread_of(run: &EnsembleRun, figure: impl Fn(&MemberFigures) -> f64) -> [f64; 5] {
     let mut values: Vec<f64> = run.members.iter().map(figure).collect();
     values.sort_by(f64::total_cmp);
-    [0.0, 0.05, 0.5, 0.95, 1.0].map(|share| {
-        let place = share * (values.len() - 1) as f64;
-        let (low, high) = (place.floor() as usize, place.ceil() as usize);
-        values[low] + (values[high] - values[low]) * (place - low as f64)
-    })
+    [0.0, 0.05, 0.5, 0.95, 1.0].map(|share| quantile(&values, share))
 }
 
 /// Runs the rigs and says how their figures spread.

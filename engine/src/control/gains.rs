@@ -9,6 +9,7 @@ use crate::explain::{Explain, number};
 ///
 /// `ti_s = ∞` stands for a controller without integral action, `td_s = 0` for one without derivative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PidGains {
     /// Kc in MV units per PV unit; negative for direct action.
     pub kc: f64,

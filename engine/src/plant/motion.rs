@@ -18,7 +18,7 @@ use super::streams::Streams;
 pub(super) const STEP_RATE: f64 = 0.4;
 /// Largest change of a head within a step, as a share of √(δ² + head²). It resolves the kink of the √ law at equal
 /// levels, and fast transients with it.
-pub(super) const STEP_CURVATURE: f64 = 0.1;
+pub(super) const STEP_CURVATURE: f64 = 0.15;
 /// Largest (λ·h)⁴ times the change of a head within a step, in cm: what the method's error is a small share of.
 pub(super) const STEP_ERROR_CM: f64 = 1e-4;
 /// Most pieces a step is cut into where δ = 0 makes the slope infinite.

@@ -238,12 +238,17 @@ fn alone(
     Ok(watch)
 }
 
-/// 5, 50 and 95 % quantiles, interpolated linearly between the order statistics.
+/// 5, 50 and 95 % quantiles.
 fn quantiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
-    [0.05, 0.5, 0.95].map(|share| {
-        let place = share * (values.len() - 1) as f64;
-        let (low, high) = (place.floor() as usize, place.ceil() as usize);
-        values[low] + (values[high] - values[low]) * (place - low as f64)
-    })
+    [0.05, 0.5, 0.95].map(|share| quantile(&values, share))
+}
+
+/// The quantile of a share, 0 to 1, of values in rising order, linear between the order statistics; NaN of none.
+#[must_use]
+pub fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share * sorted.len().saturating_sub(1) as f64;
+    let (low, high) = (place.floor() as usize, place.ceil() as usize);
+    let at = |i: usize| sorted.get(i).copied().unwrap_or(f64::NAN);
+    at(low) + (at(high) - at(low)) * (place - low as f64)
 }

@@ -14,7 +14,7 @@ mod start;
 pub use active_loop::{ActiveLoop, LoopTarget};
 pub use closed_loop::ClosedLoop;
 pub use compare::{CompareError, Comparison, InputSeries, ModelKind, ModelTrace, agreement};
-pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, run_ensemble, vary};
+pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, quantile, run_ensemble, vary};
 pub use figures::LoopFigures;
 pub use real_rig::{LevelResistance, record_real_rig};
 pub use scenario::{Run, Scenario, ScenarioError, Start, run_scenario, run_scenario_while, scenario_start};
