@@ -8,7 +8,7 @@ use super::law::{AntiWindup, Law};
 use super::schedule::SchedulePoint;
 use super::setpoint_path::SetpointPath;
 use super::smith::SmithModel;
-use crate::plant::RigError;
+use crate::plant::{RigError, demand};
 
 /// Narrower limits of a loop's output than those of what it writes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -44,21 +44,6 @@ pub struct LoopOptions {
 const LONGEST_S: f64 = 3600.0;
 /// Bound on gains, widths and rates.
 const MOST: f64 = 1e9;
-
-/// Refuses a value of a loop unless it is finite and `ok`.
-pub(super) fn demand(
-    item: &str,
-    field: &'static str,
-    value: f64,
-    ok: bool,
-    expected: impl Into<String>,
-) -> Result<(), RigError> {
-    if value.is_finite() && ok {
-        Ok(())
-    } else {
-        Err(RigError::Value { item: item.to_owned(), field, value, expected: expected.into() })
-    }
-}
 
 impl Law {
     /// Checks the law's own settings for the loop `item`, whose output lies in `range`.

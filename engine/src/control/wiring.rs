@@ -3,8 +3,7 @@
 use super::control_loop::OutputRange;
 use super::controller::Mode;
 use super::loop_spec::LoopSpec;
-use super::options::demand;
-use crate::plant::{Network, RigError};
+use crate::plant::{Network, RigError, demand};
 
 /// The loop that writes the setpoint of the loop `tag`.
 #[must_use]

@@ -160,6 +160,21 @@ pub enum RigError {
     },
 }
 
+/// Refuses a value of an item unless it is finite and `ok`.
+pub(crate) fn demand(
+    item: &str,
+    field: &'static str,
+    value: f64,
+    ok: bool,
+    expected: impl Into<String>,
+) -> Result<(), RigError> {
+    if value.is_finite() && ok {
+        Ok(())
+    } else {
+        Err(RigError::Value { item: item.to_owned(), field, value, expected: expected.into() })
+    }
+}
+
 impl Explain for RigError {
     fn key(&self) -> &'static str {
         match self {

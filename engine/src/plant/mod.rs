@@ -27,6 +27,7 @@ mod streams;
 mod two_numbers;
 
 pub use error::RigError;
+pub(crate) use error::demand;
 pub use faults::{ActiveFault, Fault, FaultKind, FaultyPart, check_fault};
 pub use flow_law::{regularised_root, regularised_root_slope};
 pub(crate) use lanes::{Number, Pack};

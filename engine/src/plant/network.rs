@@ -1,6 +1,6 @@
 //! The checked tank network: indices instead of names, every number in its range.
 
-use super::error::RigError;
+use super::error::{RigError, demand};
 use super::motions::MOST_PARTS;
 use super::names::check_names;
 use super::spec::{ConfigurationSpec, InputUnit, PumpSpec, RigSpec, SensorSpec, ValveDrive, ValveLaw};
@@ -140,23 +140,9 @@ pub struct Network {
     pub reservoir: Option<usize>,
 }
 
-fn value(
-    item: &str,
-    field: &'static str,
-    value: f64,
-    ok: bool,
-    expected: impl Into<String>,
-) -> Result<(), RigError> {
-    if value.is_finite() && ok {
-        Ok(())
-    } else {
-        Err(RigError::Value { item: item.to_owned(), field, value, expected: expected.into() })
-    }
-}
-
 fn check_delay(item: &str, delay_s: f64) -> Result<(), RigError> {
     let ok = delay_s == 0.0 || (SHORTEST_DELAY_S..=3600.0).contains(&delay_s);
-    value(item, "delay_s", delay_s, ok, "0 or 0.001…3600")
+    demand(item, "delay_s", delay_s, ok, "0 or 0.001…3600")
 }
 
 impl Network {
@@ -172,28 +158,28 @@ impl Network {
             return Err(RigError::NoTank);
         }
         check_names(&spec)?;
-        value(&spec.id, "delta_cm", spec.delta_cm, (0.0..=MOST).contains(&spec.delta_cm), "0…1e9")?;
+        demand(&spec.id, "delta_cm", spec.delta_cm, (0.0..=MOST).contains(&spec.delta_cm), "0…1e9")?;
         let sampled = (1e-3..=3600.0).contains(&spec.sample_time_s);
-        value(&spec.id, "sample_time_s", spec.sample_time_s, sampled, "0.001…3600")?;
+        demand(&spec.id, "sample_time_s", spec.sample_time_s, sampled, "0.001…3600")?;
         if let Some(c) = &spec.converters {
             let sizes = LEAST_SIZE..=MOST;
-            value(&spec.id, "shunt_ohm", c.shunt_ohm, sizes.contains(&c.shunt_ohm), "1e-6…1e9")?;
-            value(
+            demand(&spec.id, "shunt_ohm", c.shunt_ohm, sizes.contains(&c.shunt_ohm), "1e-6…1e9")?;
+            demand(
                 &spec.id,
                 "adc_full_scale_v",
                 c.adc_full_scale_v,
                 sizes.contains(&c.adc_full_scale_v),
                 "1e-6…1e9",
             )?;
-            value(
+            demand(
                 &spec.id,
                 "dac_full_scale_v",
                 c.dac_full_scale_v,
                 sizes.contains(&c.dac_full_scale_v),
                 "1e-6…1e9",
             )?;
-            value(&spec.id, "adc_bits", f64::from(c.adc_bits), (1..=32).contains(&c.adc_bits), "1…32")?;
-            value(&spec.id, "dac_bits", f64::from(c.dac_bits), (1..=32).contains(&c.dac_bits), "1…32")?;
+            demand(&spec.id, "adc_bits", f64::from(c.adc_bits), (1..=32).contains(&c.adc_bits), "1…32")?;
+            demand(&spec.id, "dac_bits", f64::from(c.dac_bits), (1..=32).contains(&c.dac_bits), "1…32")?;
         }
         let network = Self {
             delta_cm: spec.delta_cm,
@@ -206,12 +192,12 @@ impl Network {
         };
         let parts = widest(&network);
         let expected = format!("at most {MOST_PARTS} tanks, valves and pumps");
-        value(&network.spec.id, "size", parts as f64, parts <= MOST_PARTS, expected)?;
+        demand(&network.spec.id, "size", parts as f64, parts <= MOST_PARTS, expected)?;
         for configuration in &network.spec.configurations {
             network.check_configuration(configuration)?;
         }
         if let Some(water) = network.spec.water_cm3 {
-            value(&network.spec.id, "water_cm3", water, water > 0.0, "> 0")?;
+            demand(&network.spec.id, "water_cm3", water, water > 0.0, "> 0")?;
         }
         Ok(network)
     }
@@ -247,7 +233,7 @@ impl Network {
         };
         for (id, &angle) in &configuration.angles_deg {
             self.valve(id).ok_or_else(|| unknown(id))?;
-            value(id, "angle_deg", angle, (0.0..=90.0).contains(&angle), "0…90")?;
+            demand(id, "angle_deg", angle, (0.0..=90.0).contains(&angle), "0…90")?;
         }
         for (id, &delay) in &configuration.delays_s {
             self.pump(id).ok_or_else(|| unknown(id))?;
@@ -269,16 +255,16 @@ fn tanks(spec: &RigSpec) -> Result<Vec<Tank>, RigError> {
         .iter()
         .map(|t| {
             let sizes = LEAST_SIZE..=MOST;
-            value(&t.id, "area_cm2", t.area_cm2, sizes.contains(&t.area_cm2), "1e-6…1e9")?;
-            value(&t.id, "height_cm", t.height_cm, sizes.contains(&t.height_cm), "1e-6…1e9")?;
+            demand(&t.id, "area_cm2", t.area_cm2, sizes.contains(&t.area_cm2), "1e-6…1e9")?;
+            demand(&t.id, "height_cm", t.height_cm, sizes.contains(&t.height_cm), "1e-6…1e9")?;
             for place in t.at.into_iter().flatten() {
-                value(&t.id, "at", place, place.abs() <= MOST_GRID, "-1000…1000")?;
+                demand(&t.id, "at", place, place.abs() <= MOST_GRID, "-1000…1000")?;
             }
             if let Some(width) = t.width {
-                value(&t.id, "width", width, width > 0.0 && width <= MOST_GRID, "> 0 and ≤ 1000")?;
+                demand(&t.id, "width", width, width > 0.0 && width <= MOST_GRID, "> 0 and ≤ 1000")?;
             }
             let in_tank = (0.0..=t.height_cm).contains(&t.initial_cm);
-            value(&t.id, "initial_cm", t.initial_cm, in_tank, format!("0…{} (rim)", t.height_cm))?;
+            demand(&t.id, "initial_cm", t.initial_cm, in_tank, format!("0…{} (rim)", t.height_cm))?;
             let spills_to = t.spills_to.as_deref().map(|o| tank_index(spec, &t.id, o)).transpose()?;
             if spills_to.is_some_and(|o| spec.tanks[o].id == t.id) {
                 return Err(RigError::Loop { item: t.id.clone(), tank: t.id.clone() });
@@ -298,20 +284,20 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
                 return Err(RigError::Loop { item: p.id.clone(), tank: p.to.clone() });
             }
             let outlets = outlets(spec, p, to, from)?;
-            value(&p.id, "min", p.min, p.min.abs() <= MOST, "-1e9…1e9")?;
+            demand(&p.id, "min", p.min, p.min.abs() <= MOST, "-1e9…1e9")?;
             let above = p.max > p.min && p.max <= MOST;
-            value(&p.id, "max", p.max, above, format!("> min = {} and ≤ 1e9", p.min))?;
+            demand(&p.id, "max", p.max, above, format!("> min = {} and ≤ 1e9", p.min))?;
             let in_range = (p.min..=p.max).contains(&p.initial);
-            value(&p.id, "initial", p.initial, in_range, format!("{}…{}", p.min, p.max))?;
+            demand(&p.id, "initial", p.initial, in_range, format!("{}…{}", p.min, p.max))?;
             check_delay(&p.id, p.delay_s)?;
             let rate = p.rate_limit.unwrap_or(f64::MAX);
-            value(&p.id, "rate_limit", rate, rate > 0.0, "> 0")?;
+            demand(&p.id, "rate_limit", rate, rate > 0.0, "> 0")?;
             let increasing = p.curve.len() >= 2 && p.curve.windows(2).all(|w| w[1][0] > w[0][0]);
             if !increasing || p.curve.iter().any(|q| !q[0].is_finite() || !q[1].is_finite() || q[1] < 0.0) {
                 return Err(RigError::Curve { item: p.id.clone() });
             }
             for &point in p.curve.as_flattened() {
-                value(&p.id, "curve", point, point.abs() <= MOST, "within ±1e9")?;
+                demand(&p.id, "curve", point, point.abs() <= MOST, "within ±1e9")?;
             }
             Ok(Pump {
                 from,
@@ -341,7 +327,7 @@ fn outlets(
             return Err(RigError::Loop { item: pump.id.clone(), tank: id.clone() });
         }
         let left = outlets[0].1;
-        value(
+        demand(
             &pump.id,
             "split",
             share,
@@ -366,9 +352,9 @@ fn valves(spec: &RigSpec) -> Result<Vec<Valve>, RigError> {
             if v.drive == ValveDrive::Between && to.is_none() {
                 return Err(RigError::Unknown { item: v.id.clone(), reference: "to".to_owned() });
             }
-            value(&v.id, "k90", v.k90, (0.0..=MOST).contains(&v.k90), "0…1e9")?;
-            value(&v.id, "exponent", v.exponent, v.exponent > 0.0, "> 0")?;
-            value(&v.id, "angle_deg", v.angle_deg, (0.0..=90.0).contains(&v.angle_deg), "0…90")?;
+            demand(&v.id, "k90", v.k90, (0.0..=MOST).contains(&v.k90), "0…1e9")?;
+            demand(&v.id, "exponent", v.exponent, v.exponent > 0.0, "> 0")?;
+            demand(&v.id, "angle_deg", v.angle_deg, (0.0..=90.0).contains(&v.angle_deg), "0…90")?;
             Ok(Valve { from, to, drive: v.drive, law: v.law, k90: v.k90, exponent: v.exponent })
         })
         .collect()
@@ -379,11 +365,17 @@ fn sensors(spec: &RigSpec) -> Result<Vec<Sensor>, RigError> {
         .iter()
         .map(|s| {
             let tank = tank_index(spec, &s.id, &s.tank)?;
-            value(&s.id, "noise_cm", s.noise_cm, (0.0..=MOST).contains(&s.noise_cm), "0…1e9")?;
-            value(&s.id, "resolution_cm", s.resolution_cm, (0.0..=MOST).contains(&s.resolution_cm), "0…1e9")?;
+            demand(&s.id, "noise_cm", s.noise_cm, (0.0..=MOST).contains(&s.noise_cm), "0…1e9")?;
+            demand(
+                &s.id,
+                "resolution_cm",
+                s.resolution_cm,
+                (0.0..=MOST).contains(&s.resolution_cm),
+                "0…1e9",
+            )?;
             if let Some([low, high]) = s.range_cm {
-                value(&s.id, "range_cm", low, low.abs() <= MOST, "-1e9…1e9")?;
-                value(&s.id, "range_cm", high, high > low && high <= MOST, format!("> {low} and ≤ 1e9"))?;
+                demand(&s.id, "range_cm", low, low.abs() <= MOST, "-1e9…1e9")?;
+                demand(&s.id, "range_cm", high, high > low && high <= MOST, format!("> {low} and ≤ 1e9"))?;
             }
             Ok(Sensor { tank, spec: s.clone() })
         })
