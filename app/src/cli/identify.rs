@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
         mv_name: chosen.mv.clone(),
         ..FitOptions::default()
     };
-    let problem = FitProblem { time_s: &rows.time_s, pv: &rows.columns[0], mv: &rows.columns[1], options };
+    let problem = FitProblem { options, ..FitProblem::new(&rows.time_s, &rows.columns[0], &rows.columns[1]) };
     match fit_fopdt(&problem) {
         Ok(fit) => Ok(answer(arguments.json, &chosen, &fit, &log.report.repairs, warnings)),
         Err(error @ FitError::NothingToFit { .. }) => {
