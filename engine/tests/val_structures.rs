@@ -23,7 +23,7 @@ impl Truth {
             _ if t <= 0.0 => 0.0,
             Self::First { k, t: tc, .. } => -k * (-t / tc).exp_m1(),
             Self::Integrator { kv, .. } => kv * t,
-            Self::Second { k, tau, zeta, tz, .. } if zeta == 1.0 => {
+            Self::Second { k, tau, zeta: 1.0, tz, .. } => {
                 let e = (-t / tau).exp();
                 k * (1.0 - (1.0 + t / tau) * e + tz * t / (tau * tau) * e)
             }
@@ -81,7 +81,8 @@ impl Truth {
 
 fn assert_found(truth: &Truth, fit: &ModelFit, tolerance: f64, what: &str) {
     for (name, value, size) in truth.expected() {
-        let found = fit.parameter(name).unwrap_or_else(|| panic!("{what}: no {name} in {:?}", fit.parameters));
+        let found =
+            fit.parameter(name).unwrap_or_else(|| panic!("{what}: no {name} in {:?}", fit.parameters));
         assert!(
             (found.value - value).abs() <= tolerance * size.abs(),
             "{what}: {name} = {} for {value}; fit {} %",
@@ -134,9 +135,13 @@ fn val_noise_free_integrators_are_recovered() {
                 .run(&time_s, &mv, 50.0)
                 .iter()
                 .zip(&time_s)
-                .map(|(y, t)| 20.0 + y - 0.031 * (at_rest - 50.0) * t + if *t > 200.0 && gap_s > 0.0 { 3.0 } else { 0.0 })
+                .map(|(y, t)| {
+                    20.0 + y - 0.031 * (at_rest - 50.0) * t
+                        + if *t > 200.0 && gap_s > 0.0 { 3.0 } else { 0.0 }
+                })
                 .collect();
-            let fit = fit_model(&FitProblem::new(&time_s, &to_12_digits(&pv), &mv), Structure::Ipdt).expect("a fit");
+            let fit = fit_model(&FitProblem::new(&time_s, &to_12_digits(&pv), &mv), Structure::Ipdt)
+                .expect("a fit");
             assert_found(&truth, &fit, 1e-6, &format!("L {l}, gap {gap_s}"));
             assert!((fit.mv_at_rest.expect("an MV") - at_rest).abs() < 1e-5, "{:?}", fit.mv_at_rest);
             assert_eq!(fit.segments, if gap_s > 0.0 { 2 } else { 1 });
@@ -218,7 +223,10 @@ fn first_orders_are_the_same_by_both_ways() {
     let pv: Vec<f64> = truth
         .run(&time_s, &mv, 1.0)
         .iter()
-        .map(|y| { let e: f64 = StandardNormal.sample(&mut rng); y + 0.2 * e })
+        .map(|y| {
+            let e: f64 = StandardNormal.sample(&mut rng);
+            y + 0.2 * e
+        })
         .collect();
     let problem = FitProblem::new(&time_s, &pv, &mv);
     let short = fit_model(&problem, Structure::Fopdt).expect("a fit");
@@ -249,12 +257,16 @@ fn val_the_structure_that_made_the_record_is_chosen() {
     ];
     for (truth, expected) in cases {
         let clean = truth.run(&time_s, &mv, 50.0);
-        let range = clean.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - clean.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        let range = clean.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
+            - clean.iter().fold(f64::INFINITY, |a, b| a.min(*b));
         for seed in 0..5 {
             let mut rng = StdRng::seed_from_u64(seed);
             let pv: Vec<f64> = clean
                 .iter()
-                .map(|y| { let e: f64 = StandardNormal.sample(&mut rng); y + 0.02 * range * e })
+                .map(|y| {
+                    let e: f64 = StandardNormal.sample(&mut rng);
+                    y + 0.02 * range * e
+                })
                 .collect();
             let choice = choose_model(&FitProblem::new(&time_s, &pv, &mv)).expect("a model");
             assert_eq!(choice.chosen().structure, expected, "{truth:?}, seed {seed}: {:?}", choice.criterion);
@@ -281,7 +293,10 @@ fn a_drift_is_taken_out_where_there_is_one() {
             .run(&time_s, &mv, 50.0)
             .iter()
             .zip(&time_s)
-            .map(|(y, t)| { let e: f64 = StandardNormal.sample(&mut rng); y + drift * t + 0.3 * e })
+            .map(|(y, t)| {
+                let e: f64 = StandardNormal.sample(&mut rng);
+                y + drift * t + 0.3 * e
+            })
             .collect();
         let mut problem = FitProblem::new(&time_s, &pv, &mv);
         problem.options = FitOptions { drift: Drift::Auto, ..FitOptions::default() };

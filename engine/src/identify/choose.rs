@@ -2,6 +2,7 @@
 
 use super::fit_structure::{fit_on, with_drift_where_due};
 use super::model_fit::ModelFit;
+use super::output_error::Near;
 use super::problem::{Drift, FitProblem};
 use super::{FitError, FitVerdict, Structure};
 
@@ -21,11 +22,10 @@ impl Choice {
         Self { fits: vec![fit], criterion: vec![0.0] }
     }
 
-    /// Puts an objection ahead of every fit's findings.
-    pub(super) fn object(&mut self, verdict: &FitVerdict) {
+    /// Says of every fit that the stretch cannot tell a model: nothing else about it matters then.
+    pub(super) fn refuse(&mut self, verdict: &FitVerdict) {
         for fit in &mut self.fits {
-            fit.verdicts.retain(|v| !matches!(v, FitVerdict::Good { .. }));
-            fit.verdicts.insert(0, verdict.clone());
+            fit.verdicts = vec![verdict.clone()];
         }
     }
 
@@ -60,11 +60,10 @@ pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
     let mut first_error = None;
     // First order first: its dynamics start the others.
     for structure in [Structure::Fopdt, Structure::Ipdt, Structure::Sopdt, Structure::SopdtZero] {
-        let near: Vec<_> = fits
-            .iter()
-            .filter(|f| f.structure == Structure::Sopdt && structure == Structure::SopdtZero)
-            .map(|f| f.coordinates.point())
-            .collect();
+        let point =
+            |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
+        let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
+        let near = Near { first: point(Structure::Fopdt), same };
         match fit_on(problem, &stretch, structure, drift, &near) {
             Ok(fit) => fits.push(fit),
             Err(error) => first_error = first_error.or(Some(error)),
@@ -76,10 +75,10 @@ pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
     let best = fits.iter().find(|f| f.mse == least).map_or(1.0, |f| f.tests.rows_per_independent);
     let n = (fits[0].rows as f64 / best).max(10.0);
     // Below this the rows are explained to rounding and the criterion would weigh digits.
-    let floor = 1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
-    let criterion = |f: &ModelFit| {
-        n * f.mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln()
-    };
+    let floor =
+        1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
+    let criterion =
+        |f: &ModelFit| n * f.mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
     let span_s = stretch.span_s();
     let mut order: Vec<(bool, f64, ModelFit)> =
         fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
@@ -97,9 +96,8 @@ pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
 /// Whether a parameter that sets the structure apart from a simpler one cannot be told from nothing.
 fn is_flawed(fit: &ModelFit, span_s: f64) -> bool {
     let unknown = fit.parameters.iter().any(|p| !p.standard_error.is_finite());
-    let nothing = |name: &str| {
-        fit.parameter(name).is_some_and(|p| p.interval_95[0] <= 0.0 && p.interval_95[1] >= 0.0)
-    };
+    let nothing =
+        |name: &str| fit.parameter(name).is_some_and(|p| p.interval_95[0] <= 0.0 && p.interval_95[1] >= 0.0);
     let long = fit.parameter("T_s").is_some_and(|t| t.value > 2.0 * span_s);
     unknown || nothing("T2_s") || nothing("Tz_s") || long
 }

@@ -3,7 +3,9 @@
 use super::fopdt::Interval;
 use super::judge;
 use super::model_fit::{DisturbanceFit, ModelFit};
-use super::output_error::{Found, Linear, Order, Point, Shape, Symmetric, Work, blocks, evaluate, search};
+use super::output_error::{
+    Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, evaluate, search,
+};
 use super::parameters::Coordinates;
 use super::problem::{Drift, FitProblem, Stretch};
 use super::residual_tests::ResidualTests;
@@ -25,7 +27,7 @@ use super::{FitError, Structure, fit_fopdt};
 pub fn fit_model(problem: &FitProblem, structure: Structure) -> Result<ModelFit, FitError> {
     let stretch = problem.stretch()?;
     let with = problem.options.drift == Drift::Linear;
-    let plain = fit_on(problem, &stretch, structure, with, &[])?;
+    let plain = fit_on(problem, &stretch, structure, with, &Near::default())?;
     if problem.options.drift != Drift::Auto || structure == Structure::Ipdt {
         return Ok(plain);
     }
@@ -37,15 +39,24 @@ pub(super) fn with_drift_where_due(problem: &FitProblem, stretch: &Stretch, plai
     /// Schwarz's criterion must fall by this much: "very strong" evidence (Kass & Raftery, JASA 90 (1995) 773).
     const VERY_STRONG: f64 = 10.0;
     // Residuals without a trend leave a drift nothing to explain.
-    if plain.fit_percent > 99.9 || plain.tests.is_white() {
+    if plain.fit_percent > 99.9 || plain.tests.is_white() || !tells_drift(stretch, &plain) {
         return plain;
     }
-    let near = [plain.coordinates.point()];
+    let near = Near { same: Some(plain.coordinates.point()), ..Near::default() };
     let Ok(drifting) = fit_on(problem, stretch, plain.structure, true, &near) else { return plain };
     let independent = plain.rows as f64 / drifting.tests.rows_per_independent;
     let gained = independent * (plain.mse / drifting.mse).ln() - independent.max(2.0).ln();
     let told = drifting.drift.is_some_and(|(_, [low, high])| low > 0.0 || high < 0.0);
     if gained > VERY_STRONG && told { drifting } else { plain }
+}
+
+/// A drift and the end of a slow response look alike: they are told apart where the MV moves more than once and the
+/// record is long for the dynamics.
+fn tells_drift(stretch: &Stretch, fit: &ModelFit) -> bool {
+    const TIME_CONSTANTS: f64 = 6.0;
+    let moves = stretch.u.windows(2).filter(|w| w[0] != w[1]).take(2).count();
+    let slow_s: f64 = ["T_s", "T2_s", "L_s"].iter().filter_map(|n| fit.parameter(n)).map(|p| p.value).sum();
+    moves > 1 && stretch.span_s() > TIME_CONSTANTS * slow_s
 }
 
 /// Fits a structure with or without drift; `near` are points of the main channel already found.
@@ -54,7 +65,7 @@ pub(super) fn fit_on(
     stretch: &Stretch,
     structure: Structure,
     drift: bool,
-    near: &[Point],
+    near: &Near,
 ) -> Result<ModelFit, FitError> {
     let shape = shape_of(stretch, structure, drift);
     let nothing = || FitError::NothingToFit {
@@ -62,10 +73,8 @@ pub(super) fn fit_on(
         mv_name: problem.options.mv_name.clone(),
     };
     let mut work = Work::default();
-    let plain = structure == Structure::Fopdt
-        && !drift
-        && stretch.keep.is_none()
-        && problem.disturbances.is_empty();
+    let plain =
+        structure == Structure::Fopdt && !drift && stretch.keep.is_none() && problem.disturbances.is_empty();
     let mut dead_time_interval = None;
     let found = if plain {
         let fit = fit_fopdt(problem)?;
@@ -73,12 +82,12 @@ pub(super) fn fit_on(
         dead_time_interval = Some(fit.interval_95.dead_time_s);
         let point =
             Point { time_s: fit.model.time_constant_s, zeta: 1.0, dead_time_s: fit.model.dead_time_s };
-        let rough = evaluate(stretch, &shape, vec![point], &Linear::zero(&shape, stretch));
-        // A second pass takes the residuals against the first's answer and so keeps their digits.
-        rough.and_then(|f| evaluate(stretch, &shape, vec![point], &f.projected.linear).or(Some(f)))
+        // Residuals against the short cut's answer keep the digits that the inner products would square away.
+        let mut reference = Linear::zero(&shape, stretch);
+        reference.shared = vec![fit.bias + fit.model.gain * stretch.u_ref - stretch.y_ref, fit.model.gain];
+        evaluate(stretch, &shape, vec![point], &reference)
     } else {
-        let near: Vec<Vec<Point>> = near.iter().map(|p| vec![*p]).collect();
-        search(stretch, &shape, &near, &mut work)
+        search(stretch, &shape, near, &mut work)
     };
     let found = found.ok_or_else(nothing)?;
     let mut fit = report(problem, stretch, structure, &shape, &found).ok_or_else(nothing)?;
@@ -116,8 +125,13 @@ fn report(
     let (simulated, residuals) = free_run(stretch, shape, found);
     let rows = stretch.kept();
     let rss: f64 = residuals.iter().map(|r| r * r).sum();
-    let movement: f64 =
-        stretch.y.iter().enumerate().filter(|(k, _)| stretch.counts(*k)).map(|(_, y)| (y - stretch.y_ref).powi(2)).sum();
+    let movement: f64 = stretch
+        .y
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| stretch.counts(*k))
+        .map(|(_, y)| (y - stretch.y_ref).powi(2))
+        .sum();
     let unknowns = shape.parameters(stretch);
     let freedom = rows.saturating_sub(unknowns).max(1);
     let tests = ResidualTests::new(&residuals, &stretch.u);
@@ -146,9 +160,8 @@ fn report(
         (value, [value - student * error, value + student * error] as Interval)
     });
     let gain = linear.shared[shape.gains[0]];
-    let centred: f64 = (0..shape.channels.len())
-        .map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference)
-        .sum();
+    let centred: f64 =
+        (0..shape.channels.len()).map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference).sum();
     let mse = rss / rows as f64;
     Some(ModelFit {
         structure,
@@ -201,11 +214,17 @@ fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f
     let mut simulated = Vec::with_capacity(stretch.len());
     let mut residuals = Vec::with_capacity(stretch.len());
     let whole = Stretch { keep: None, ..stretch.clone() };
-    blocks(&whole, &shape.without_derivatives(), &found.points, &found.projected.linear, |_, first, columns| {
-        for (i, r) in columns.values[shape.residual][..columns.rows].iter().enumerate() {
-            simulated.push(stretch.y[first + i] - r);
-            residuals.push(if stretch.counts(first + i) { *r } else { 0.0 });
-        }
-    });
+    blocks(
+        &whole,
+        &shape.without_derivatives(),
+        &found.points,
+        &found.projected.linear,
+        |_, first, columns| {
+            for (i, r) in columns.values[shape.residual][..columns.rows].iter().enumerate() {
+                simulated.push(stretch.y[first + i] - r);
+                residuals.push(if stretch.counts(first + i) { *r } else { 0.0 });
+            }
+        },
+    );
     (simulated, residuals)
 }

@@ -1,5 +1,6 @@
 //! The first-order-plus-dead-time fit by output error.
 
+use super::FitError;
 use super::gram::Linear;
 use super::optimise::{Bounds, Point, evaluate, no_reference, refine};
 use super::problem::{FitProblem, Stretch};
@@ -7,7 +8,6 @@ use super::profile::dead_time_interval;
 use super::response::{Dynamics, residuals};
 use super::start::starts;
 use super::statistics::{inverse, student_95};
-use super::FitError;
 use crate::model::Fopdt;
 
 /// Rows above which a start is sought on a thinned-out copy.

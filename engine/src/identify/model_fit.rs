@@ -163,8 +163,8 @@ impl ModelFit {
 
 fn slope_of(c: &Coordinates, i: usize, curve: &dyn Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     let error = c.covariance.at(i, i).sqrt();
-    let step = if error.is_finite() { (0.05 * error).clamp(1e-7, 1e-3) } else { 1e-5 }
-        * c.values[i].abs().max(1e-2);
+    let step =
+        if error.is_finite() { (0.05 * error).clamp(1e-7, 1e-3) } else { 1e-5 } * c.values[i].abs().max(1e-2);
     let at = |d: f64| {
         let mut v = c.values.clone();
         v[i] += d;

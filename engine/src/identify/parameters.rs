@@ -77,7 +77,8 @@ impl Coordinates {
     pub fn slope(&self, i: usize, f: impl Fn(&[f64]) -> f64) -> f64 {
         let error = self.covariance.at(i, i).sqrt();
         let size = self.values[i].abs().max(1e-3);
-        let step = if error.is_finite() { (0.01 * error).clamp(1e-7 * size, 1e-3 * size) } else { 1e-5 * size };
+        let step =
+            if error.is_finite() { (0.01 * error).clamp(1e-7 * size, 1e-3 * size) } else { 1e-5 * size };
         let at = |d: f64| {
             let mut v = self.values.clone();
             v[i] += d;
@@ -179,7 +180,13 @@ fn time_constants(tau: f64, zeta: f64) -> [f64; 2] {
     [tau * slow, tau / slow]
 }
 
-fn second_order(k: f64, tz_s: f64, tau_s: f64, zeta: f64, dead_time_s: f64) -> Result<ProcessModel, ModelError> {
+fn second_order(
+    k: f64,
+    tz_s: f64,
+    tau_s: f64,
+    zeta: f64,
+    dead_time_s: f64,
+) -> Result<ProcessModel, ModelError> {
     if zeta >= 1.0 {
         let [t1, t2] = time_constants(tau_s, zeta);
         return Ok(ProcessModel::Sopdt(Sopdt::new(k, t1, t2, tz_s, dead_time_s)?));

@@ -52,10 +52,9 @@ impl Gram {
         for i in (0..self.count).filter(|&i| columns.alive[i]) {
             let row = &mut self.products[i * self.count..(i + 1) * self.count];
             let a = &columns.values[i];
-            for j in i..self.count {
-                if columns.alive[j] {
-                    row[j] += dot(a, &columns.values[j]);
-                }
+            let others = columns.values.iter().zip(&columns.alive);
+            for (sum, (b, _)) in row.iter_mut().zip(others).skip(i).filter(|(_, (_, alive))| **alive) {
+                *sum += dot(a, b);
             }
         }
     }

@@ -6,7 +6,9 @@ use super::shape::{Linear, Order, Point, Shape};
 use crate::identify::problem::Stretch;
 
 /// A step below this many standard errors changes nothing a reader could see.
-const STEP_IN_STANDARD_ERRORS: f64 = 1e-4;
+const STEP_IN_STANDARD_ERRORS: [f64; 2] = [1e-4, 1e-3];
+/// Rows above which the larger of the two will do: passes are dear there.
+const MANY_ROWS: usize = 5000;
 /// A step this small is at the end of the digits.
 const STEP_AT_ROUNDING: f64 = 1e-12;
 /// Largest change of ln T, ln τ, ln ζ, L/T in a step.
@@ -57,7 +59,12 @@ impl Found {
 }
 
 /// One pass.
-pub(in crate::identify) fn evaluate(stretch: &Stretch, shape: &Shape, points: Vec<Point>, reference: &Linear) -> Option<Found> {
+pub(in crate::identify) fn evaluate(
+    stretch: &Stretch,
+    shape: &Shape,
+    points: Vec<Point>,
+    reference: &Linear,
+) -> Option<Found> {
     let grams = grams(stretch, shape, &points, reference);
     let projected = project(&grams, shape, reference)?;
     projected.rss.is_finite().then_some(Found { points, projected })
@@ -78,13 +85,14 @@ pub(in crate::identify) fn refine(
     *count += 1;
     let mut best = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
     let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
+    let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
     let mut damping = 1e-6;
     for _ in 1..passes {
         let reduced = Reduced::of(&best.projected, &held(shape, &best.points));
         let step = reduced.step(damping);
         let target = clip(&moved(shape, &best.points, &step));
         let taken = difference(shape, &best.points, &target);
-        if reduced.is_small(&taken, best.rss() / spare) {
+        if reduced.is_small(&taken, best.rss() / spare, tolerance) {
             break;
         }
         *count += 1;
@@ -240,12 +248,12 @@ impl Reduced {
         step
     }
 
-    fn is_small(&self, step: &[f64], variance: f64) -> bool {
+    fn is_small(&self, step: &[f64], variance: f64, tolerance: f64) -> bool {
         step.iter().enumerate().all(|(i, step)| {
             // √(1/Hii) is the standard error with the others fixed: the smaller, hence safer, of the two.
             let h = self.h.at(i, i);
             let error = if h > 0.0 { (variance / h).sqrt() } else { 0.0 };
-            step.abs() <= (STEP_IN_STANDARD_ERRORS * error).max(STEP_AT_ROUNDING)
+            step.abs() <= (tolerance * error).max(STEP_AT_ROUNDING)
         })
     }
 }

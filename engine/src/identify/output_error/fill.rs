@@ -10,7 +10,12 @@ use crate::identify::problem::{Input, Stretch};
 const GONE: f64 = 1e-18;
 
 /// The Gram matrix of each segment, residuals taken against `reference`.
-pub(in crate::identify) fn grams(stretch: &Stretch, shape: &Shape, points: &[Point], reference: &Linear) -> Vec<Gram> {
+pub(in crate::identify) fn grams(
+    stretch: &Stretch,
+    shape: &Shape,
+    points: &[Point],
+    reference: &Linear,
+) -> Vec<Gram> {
     let mut grams: Vec<Gram> = Vec::with_capacity(stretch.segments.len());
     blocks(stretch, shape, points, reference, |segment, _, columns| {
         if grams.len() <= segment {
@@ -71,7 +76,14 @@ pub(in crate::identify) fn blocks(
     }
 }
 
-fn residual(s: &Stretch, shape: &Shape, reference: &Linear, segment: usize, first: usize, columns: &mut Columns) {
+fn residual(
+    s: &Stretch,
+    shape: &Shape,
+    reference: &Linear,
+    segment: usize,
+    first: usize,
+    columns: &mut Columns,
+) {
     let rows = columns.rows;
     let mut r = [0.0; ROWS];
     for (value, y) in r.iter_mut().zip(&s.y[first..first + rows]) {
@@ -94,16 +106,21 @@ fn residual(s: &Stretch, shape: &Shape, reference: &Linear, segment: usize, firs
 enum Channel<'a> {
     First(Feed<'a, First>),
     Integrator(Feed<'a, Integrator>),
-    Second(Feed<'a, Second>),
+    Second(Box<Feed<'a, Second>>),
 }
 
 impl<'a> Channel<'a> {
     fn new(s: &Stretch<'_>, order: Order, point: Point, column: usize, input: Input<'a>) -> Self {
         let u = input.before - input.reference;
         match order {
-            Order::First => {
-                Self::First(Feed::new(First::at_rest(point.time_s, u), s, point.dead_time_s, column, 3, input))
-            }
+            Order::First => Self::First(Feed::new(
+                First::at_rest(point.time_s, u),
+                s,
+                point.dead_time_s,
+                column,
+                3,
+                input,
+            )),
             Order::Integrator => {
                 let kernel = Integrator::new(point.time_s);
                 Self::Integrator(Feed::new(kernel, s, point.dead_time_s, column, 2, input))
@@ -111,7 +128,7 @@ impl<'a> Channel<'a> {
             Order::Second { zero } => {
                 let kernel = Second::at_rest(point.time_s, point.zeta, u);
                 let count = if zero { 8 } else { 4 };
-                Self::Second(Feed::new(kernel, s, point.dead_time_s, column, count, input))
+                Self::Second(Box::new(Feed::new(kernel, s, point.dead_time_s, column, count, input)))
             }
         }
     }
@@ -142,7 +159,14 @@ struct Feed<'a, K: Kernel> {
 }
 
 impl<'a, K: Kernel> Feed<'a, K> {
-    fn new(kernel: K, s: &Stretch<'_>, dead_time_s: f64, column: usize, count: usize, input: Input<'a>) -> Self {
+    fn new(
+        kernel: K,
+        s: &Stretch<'_>,
+        dead_time_s: f64,
+        column: usize,
+        count: usize,
+        input: Input<'a>,
+    ) -> Self {
         let grid = s.uniform.then(|| {
             let h = s.sample_time_s;
             let lag = (dead_time_s / h).floor();
@@ -183,7 +207,9 @@ impl<'a, K: Kernel> Feed<'a, K> {
                 }
             }
             let output = self.kernel.output();
-            for (column, &value) in columns.values[self.column..].iter_mut().zip(&output.as_ref()[..self.count]) {
+            for (column, &value) in
+                columns.values[self.column..].iter_mut().zip(&output.as_ref()[..self.count])
+            {
                 column[i] = value;
             }
         }

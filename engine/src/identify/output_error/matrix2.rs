@@ -29,10 +29,8 @@ impl Exponential {
         ];
         // dC/dζ = ζ s S, dS/dζ = 2ζ ∂S/∂Δ, both with the common e^(−ζs), whose derivative is −s.
         let (dc, ds) = (zeta * s * sine - s * c, 2.0 * zeta * s_by_delta - s * sine);
-        let by_zeta = [
-            [zeta * (dc + sine + zeta * ds), zeta * ds],
-            [-zeta * ds, zeta * (dc - sine - zeta * ds)],
-        ];
+        let by_zeta =
+            [[zeta * (dc + sine + zeta * ds), zeta * ds], [-zeta * ds, zeta * (dc - sine - zeta * ds)]];
         Self { e, by_tau, by_zeta }
     }
 }
@@ -119,8 +117,7 @@ mod tests {
             for s in [1e-3, 0.1, 0.9, 1.1, 4.0, 12.0] {
                 let found = Exponential::new(s, zeta);
                 let step = 1e-5;
-                let (ahead, behind) =
-                    (reference(s, zeta * (1.0 + step)), reference(s, zeta * (1.0 - step)));
+                let (ahead, behind) = (reference(s, zeta * (1.0 + step)), reference(s, zeta * (1.0 - step)));
                 let (longer, shorter) =
                     (reference(s * (1.0 + step), zeta), reference(s * (1.0 - step), zeta));
                 let exact = reference(s, zeta);

@@ -16,5 +16,5 @@ mod shape;
 pub(super) use descend::{Found, evaluate};
 pub(super) use fill::blocks;
 pub(super) use project::Symmetric;
-pub(super) use search::{Work, search};
+pub(super) use search::{Near, Work, search};
 pub(super) use shape::{Linear, Order, Point, Shape};

@@ -154,9 +154,8 @@ fn solve_linear(grams: &[Gram], shape: &Shape, reference: &Linear) -> Option<(Li
     if !taken[shape.gains[0]] {
         return None;
     }
-    let solution: Vec<f64> = (0..shared)
-        .map(|i| if taken[i] { whole.at(i, shared) / whole.at(i, i) } else { 0.0 })
-        .collect();
+    let solution: Vec<f64> =
+        (0..shared).map(|i| if taken[i] { whole.at(i, shared) / whole.at(i, i) } else { 0.0 }).collect();
     let local = segments
         .iter()
         .zip(&reference.local)
@@ -222,8 +221,7 @@ fn normal_equations(
         // What is left with the new linear unknowns: r less what they add to the reference.
         let mut left: Combination = vec![(1.0, shape.residual)];
         let moved = shape.shared.iter().zip(linear.shared.iter().zip(&reference.shared));
-        let moved_local =
-            shape.local.iter().zip(linear.local[segment].iter().zip(&reference.local[segment]));
+        let moved_local = shape.local.iter().zip(linear.local[segment].iter().zip(&reference.local[segment]));
         left.extend(moved.chain(moved_local).map(|(term, (new, old))| (old - new, term.column)));
         columns.push(left);
         let size = columns.len();
@@ -237,8 +235,8 @@ fn normal_equations(
         }
         let sizes: Vec<f64> = (0..size).map(|i| s.at(i, i)).collect();
         s.eliminate(0..locals, &sizes);
-        for i in 0..count {
-            rhs[i] += s.at(locals + i, size - 1);
+        for (i, right) in rhs.iter_mut().enumerate() {
+            *right += s.at(locals + i, size - 1);
             for j in 0..count {
                 matrix.add(i, j, s.at(locals + i, locals + j));
             }

@@ -25,8 +25,22 @@ pub(in crate::identify) struct Work {
     pub thinned: usize,
 }
 
-/// The best point of a shape; `near` are points already found for simpler shapes of the same channels.
-pub(in crate::identify) fn search(stretch: &Stretch, shape: &Shape, near: &[Vec<Point>], work: &mut Work) -> Option<Found> {
+/// Points that simpler fits of the same stretch have found for the main channel.
+#[derive(Debug, Clone, Default)]
+pub(in crate::identify) struct Near {
+    /// First order.
+    pub first: Option<Point>,
+    /// Of the same order.
+    pub same: Option<Point>,
+}
+
+/// The best point of a shape.
+pub(in crate::identify) fn search(
+    stretch: &Stretch,
+    shape: &Shape,
+    near: &Near,
+    work: &mut Work,
+) -> Option<Found> {
     let copies = copies(stretch);
     let coarsest = copies.last().unwrap_or(stretch);
     let mut count = 0;
@@ -39,14 +53,8 @@ pub(in crate::identify) fn search(stretch: &Stretch, shape: &Shape, near: &[Vec<
         best = refine(copy, shape, &best.points, PASSES, &mut count).unwrap_or(best);
     }
     work.thinned += count;
-    let mut found = refine(stretch, shape, &best.points, PASSES, &mut work.passes);
-    // What the copies blur away a finer start may see.
-    for points in near {
-        let main = points.first().copied().into_iter();
-        let at: Vec<Point> = main.chain(best.points.iter().skip(1).copied()).collect();
-        found = better(found, refine(stretch, shape, &at, PASSES, &mut work.passes));
-    }
-    found.map(|found| look_around(stretch, shape, found, work))
+    let found = refine(stretch, shape, &best.points, PASSES, &mut work.passes)?;
+    Some(look_around(stretch, shape, found, work))
 }
 
 /// The cost has a kink wherever a dead time passes a row: tries the neighbouring cells where the rows are far apart.
@@ -58,7 +66,7 @@ fn look_around(stretch: &Stretch, shape: &Shape, best: Found, work: &mut Work) -
     let h = stretch.sample_time_s;
     for channel in 0..shape.channels.len() {
         let found = best.points[channel];
-        if h <= 0.02 * found.time_s || stretch.len() > ROWS {
+        if h <= 0.02 * found.time_s || stretch.len() > ROWS || blurred(stretch, shape, &best, channel) {
             continue;
         }
         let cell = (found.dead_time_s / h).floor();
@@ -73,6 +81,16 @@ fn look_around(stretch: &Stretch, shape: &Shape, best: Found, work: &mut Work) -
         }
     }
     best
+}
+
+/// Whether noise hides the kinks of a channel's dead time: its standard error exceeds the sample time.
+fn blurred(stretch: &Stretch, shape: &Shape, found: &Found, channel: usize) -> bool {
+    let at = shape.shared.len() + shape.first_unknown(channel) + shape.channels[channel].unknowns() - 1;
+    let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
+    // Without an inverse nothing tells the dead time, and no cell is better than its neighbour.
+    found.projected.matrix.inverse().is_none_or(|c| {
+        (found.rss() / spare * c.at(at, at)).sqrt() * found.points[channel].time_s > stretch.sample_time_s
+    })
 }
 
 fn copies(stretch: &Stretch) -> Vec<Stretch<'static>> {
@@ -96,15 +114,12 @@ fn better(a: Option<Found>, b: Option<Found>) -> Option<Found> {
 }
 
 /// The best point on a short record: the main channel first, then each further one, then all together.
-fn start(stretch: &Stretch, shape: &Shape, near: &[Vec<Point>], count: &mut usize) -> Option<Found> {
+fn start(stretch: &Stretch, shape: &Shape, near: &Near, count: &mut usize) -> Option<Found> {
     let main = shape.channels[0];
     let alone = Shape::new(vec![main], shape.drift, shape.free);
-    let mut best: Option<Found> = None;
-    let mut candidates = main_starts(stretch, &alone, count);
-    candidates.extend(near.iter().filter_map(|points| points.first().copied()));
-    for point in candidates {
-        best = better(best, refine(stretch, &alone, &[point], PASSES, count));
-    }
+    let mut candidates = main_starts(stretch, &alone, near, count);
+    candidates.extend(near.same);
+    let best = most_promising(stretch, &alone, candidates, count);
     let mut best = best?;
     for channel in 1..shape.channels.len() {
         let so_far = Shape::new(shape.channels[..=channel].to_vec(), shape.drift, shape.free);
@@ -135,7 +150,36 @@ fn start(stretch: &Stretch, shape: &Shape, near: &[Vec<Point>], count: &mut usiz
     Some(best)
 }
 
-fn main_starts(stretch: &Stretch, alone: &Shape, count: &mut usize) -> Vec<Point> {
+/// Refines candidates briefly on a short copy, and the better half of them to the end.
+fn most_promising(
+    stretch: &Stretch,
+    shape: &Shape,
+    candidates: Vec<Point>,
+    count: &mut usize,
+) -> Option<Found> {
+    const BRIEF: usize = 10;
+    const TO_THE_END: usize = 2;
+    let mut tried: Vec<(f64, Point)> = Vec::new();
+    if stretch.len() > 2 * SCAN_ROWS && candidates.len() > TO_THE_END {
+        let short = stretch.thinned(stretch.len().div_ceil(SCAN_ROWS));
+        for point in candidates {
+            if let Some(found) = refine(&short, shape, &[point], BRIEF, count) {
+                tried.push((found.rss(), found.points[0]));
+            }
+        }
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        tried.truncate(TO_THE_END);
+    } else {
+        tried.extend(candidates.into_iter().map(|point| (0.0, point)));
+    }
+    let mut best = None;
+    for (_, point) in tried {
+        best = better(best, refine(stretch, shape, &[point], PASSES, count));
+    }
+    best
+}
+
+fn main_starts(stretch: &Stretch, alone: &Shape, near: &Near, count: &mut usize) -> Vec<Point> {
     let plain = |d: &crate::identify::response::Dynamics| Point {
         time_s: d.time_constant_s,
         zeta: 1.0,
@@ -151,19 +195,19 @@ fn main_starts(stretch: &Stretch, alone: &Shape, count: &mut usize) -> Vec<Point
             let grid = grid_of(stretch, Order::Integrator).into_iter().map(|p| vec![p]).collect();
             scan(stretch, alone, grid, count).into_iter().map(|points| points[0]).collect()
         }
-        Order::Second { .. } => second_starts(stretch, alone, count),
+        Order::Second { .. } => second_starts(stretch, alone, near, count),
     }
 }
 
 /// A second order near the first-order fit, and anything that rings.
-fn second_starts(stretch: &Stretch, alone: &Shape, count: &mut usize) -> Vec<Point> {
-    let first = Shape::new(vec![Order::First], alone.drift, alone.free);
-    let mut nearby: Option<Found> = None;
-    for p in main_starts(stretch, &first, count) {
-        nearby = better(nearby, refine(stretch, &first, &[p], 12, count));
-    }
-    let (time_s, dead_time_s) = nearby
-        .map_or((stretch.span_s() / 5.0, 0.0), |f| (f.points[0].time_s, f.points[0].dead_time_s));
+fn second_starts(stretch: &Stretch, alone: &Shape, near: &Near, count: &mut usize) -> Vec<Point> {
+    let nearby = near.first.or_else(|| {
+        let first = Shape::new(vec![Order::First], alone.drift, alone.free);
+        let starts = main_starts(stretch, &first, near, count);
+        most_promising(stretch, &first, starts, count).map(|f| f.points[0])
+    });
+    let (time_s, dead_time_s) =
+        nearby.map_or((stretch.span_s() / 5.0, 0.0), |point| (point.time_s, point.dead_time_s));
     let mut grid = Vec::new();
     let quickest = stretch.sample_time_s;
     for zeta in [0.15, 0.45, 1.0, 2.5] {

@@ -105,7 +105,11 @@ impl Shape {
         let one = Term { column: ONE, derivatives: vec![] };
         let (mut shared, mut local) = (vec![], vec![]);
         // An integrator's level after a gap is anyone's guess: its constant belongs to the segment.
-        if integrating { local.push(one) } else { shared.push(one) }
+        if integrating {
+            local.push(one)
+        } else {
+            shared.push(one)
+        }
         let mut next = 1;
         let drift_column = (drift || integrating).then(|| {
             shared.push(Term { column: next, derivatives: vec![] });

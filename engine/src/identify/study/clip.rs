@@ -35,8 +35,10 @@ pub(super) fn limits(problem: &FitProblem) -> Option<[f64; 2]> {
     let mut best = (plain.mse, whole);
     for _ in 0..2 {
         for side in [1, 0] {
-            let mut steps: Vec<f64> =
-                (1..20).map(|i| sorted[(sorted.len() - 1) * i / 20]).filter(|v| *v > whole[0] && *v < whole[1]).collect();
+            let mut steps: Vec<f64> = (1..20)
+                .map(|i| sorted[(sorted.len() - 1) * i / 20])
+                .filter(|v| *v > whole[0] && *v < whole[1])
+                .collect();
             // Round numbers are what limits are set to.
             steps.push(0.0);
             for value in steps.into_iter().filter(|v| *v > whole[0] && *v < whole[1]) {

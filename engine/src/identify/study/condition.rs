@@ -238,7 +238,8 @@ mod tests {
         let out: Vec<usize> = (0..900).filter(|&k| !found.keep[k]).collect();
         assert_eq!(out, [100, 101, 500, 777]);
         assert!(matches!(found.findings[0], RecordFinding::Outliers { count: 4, row: 102, .. }));
-        let step: Vec<f64> = pv.iter().enumerate().map(|(k, y)| if k > 600 { y + 50.0 } else { *y }).collect();
+        let step: Vec<f64> =
+            pv.iter().enumerate().map(|(k, y)| if k > 600 { y + 50.0 } else { *y }).collect();
         assert!((597..606).all(|k| condition(&t, &step, &mv, 1).keep[k]));
     }
 
@@ -248,11 +249,19 @@ mod tests {
         let held = pv[310];
         pv[310..370].fill(held);
         let found = condition(&t, &pv, &mv, 1);
-        assert!(matches!(found.findings[..], [RecordFinding::Frozen { rows: 59, times: 1, .. }]), "{:?}", found.findings);
+        assert!(
+            matches!(found.findings[..], [RecordFinding::Frozen { rows: 59, times: 1, .. }]),
+            "{:?}",
+            found.findings
+        );
         let (t, pv, mv) = noisy(900);
         let slow: Vec<f64> = (0..900).map(|k| pv[k - k % 4]).collect();
         let found = condition(&t, &slow, &mv, 1);
-        assert!(matches!(found.findings[..], [RecordFinding::Oversampled { rows: 4 }]), "{:?}", found.findings);
+        assert!(
+            matches!(found.findings[..], [RecordFinding::Oversampled { rows: 4 }]),
+            "{:?}",
+            found.findings
+        );
         assert_eq!(found.keep.iter().filter(|k| **k).count(), 225);
     }
 
@@ -267,6 +276,9 @@ mod tests {
             .filter_map(|f| if let RecordFinding::MvAtLimit { limit, .. } = f { Some(*limit) } else { None })
             .collect();
         assert_eq!(limits, [0.0, 100.0]);
-        assert_eq!(found.saturated.iter().filter(|s| **s).count(), mv.iter().filter(|u| **u == 0.0 || **u == 100.0).count());
+        assert_eq!(
+            found.saturated.iter().filter(|s| **s).count(),
+            mv.iter().filter(|u| **u == 0.0 || **u == 100.0).count()
+        );
     }
 }

@@ -61,8 +61,10 @@ pub(super) struct Columns<'a> {
 /// Regresses the moves of the MV on those of the error: Δu = Kc (b Δr − Δy) + Kc/Ti ∫e dt − Kc Td Δ²y/h.
 ///
 /// Tries moves over 1 to 8 rows, an answer in the same row and in the next, and b = 0 and 1; takes what explains the
-/// moves best. `None` below 20 moves or where nothing explains a twentieth of them.
+/// moves best. `None` below 20 moves, where nothing explains a third of them, or where not even the sign of Kc is told:
+/// then a hand moves the MV.
 pub(super) fn fit_controller(columns: &Columns) -> Option<ControllerFit> {
+    const EXPLAINED: f64 = 0.33;
     const STRIDES: [usize; 4] = [1, 2, 4, 8];
     /// A longer stride must explain this much more of its moves.
     const WORTH: f64 = 0.02;
@@ -79,7 +81,8 @@ pub(super) fn fit_controller(columns: &Columns) -> Option<ControllerFit> {
             }
         }
     }
-    best.filter(|b| b.r2 > 0.05)
+    let [low, high] = best.as_ref()?.kc_interval_95;
+    best.filter(|b| b.r2 > EXPLAINED && low * high > 0.0)
 }
 
 /// Regressors of a move: proportional, integral, derivative, and a constant where the setpoint is unknown.
@@ -90,7 +93,8 @@ fn regress(c: &Columns, stride: usize, lag: usize, b: f64) -> Option<ControllerF
     let with_constant = c.sp.is_none();
     let derivative = solve(&rows, &[true, true, true, with_constant])?;
     // Derivative action stays in only where it is beyond doubt.
-    let keep = derivative.values[2].abs() > 4.0 * derivative.errors[2] && derivative.values[2] * derivative.values[0] > 0.0;
+    let keep = derivative.values[2].abs() > 4.0 * derivative.errors[2]
+        && derivative.values[2] * derivative.values[0] > 0.0;
     let solved = if keep { derivative } else { solve(&rows, &[true, true, false, with_constant])? };
     let [kp, ki, kd, _] = solved.values;
     let t = student_95(rows.len().saturating_sub(3));
@@ -100,7 +104,11 @@ fn regress(c: &Columns, stride: usize, lag: usize, b: f64) -> Option<ControllerF
         let relative = (solved.errors[0] / kp).powi(2) + (solved.errors[i] / solved.values[i]).powi(2)
             - 2.0 * solved.cross[i] / (kp * solved.values[i]);
         let error = value.abs() * relative.max(0.0).sqrt();
-        let high = if inverse && solved.values[i].abs() < t * solved.errors[i] { f64::INFINITY } else { value + t * error };
+        let high = if inverse && solved.values[i].abs() < t * solved.errors[i] {
+            f64::INFINITY
+        } else {
+            value + t * error
+        };
         [(value - t * error).max(0.0), high]
     };
     let integral = kp * ki > 0.0 && solved.errors[1] > 0.0;

@@ -144,11 +144,9 @@ impl std::fmt::Display for RecordFinding {
                 n(*kc),
                 n(*gain)
             ),
-            Self::UnstableTuning { kc } => write!(
-                f,
-                "the tuning in the log (Kc = {}) is not stable with this model",
-                n(*kc)
-            ),
+            Self::UnstableTuning { kc } => {
+                write!(f, "the tuning in the log (Kc = {}) is not stable with this model", n(*kc))
+            }
         }
     }
 }
@@ -205,7 +203,10 @@ impl RecordFinding {
     pub fn is_warning(&self) -> bool {
         matches!(
             self,
-            Self::Stiction { .. } | Self::WrongSign { .. } | Self::UnstableTuning { .. } | Self::MvBeyondLimits { .. }
+            Self::Stiction { .. }
+                | Self::WrongSign { .. }
+                | Self::UnstableTuning { .. }
+                | Self::MvBeyondLimits { .. }
         )
     }
 

@@ -144,7 +144,9 @@ fn controller_of(
     let in_mode = |mode: Option<f64>| -> Option<ControllerFit> {
         let usable: Vec<bool> = (0..rows)
             .map(|k| {
-                keep(k) && !saturated[k] && mode.is_none_or(|m| record.mode.is_some_and(|column| column[k] == m))
+                keep(k)
+                    && !saturated[k]
+                    && mode.is_none_or(|m| record.mode.is_some_and(|column| column[k] == m))
             })
             .collect();
         controller::fit_controller(&controller::Columns {
@@ -202,7 +204,7 @@ fn refuse_feedback(
     let one_mode = record.mode.is_none_or(|mode| mode.iter().all(|m| *m == mode[0]));
     let other_excitation = problem.disturbances.iter().any(|d| d.values.iter().any(|v| *v != d.values[0]));
     if still && one_mode && !other_excitation {
-        choice.object(&FitVerdict::NoExcitation {
+        choice.refuse(&FitVerdict::NoExcitation {
             mv_name: problem.options.mv_name.clone(),
             explained_percent: 100.0 * controller.r2,
         });

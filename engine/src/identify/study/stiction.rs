@@ -101,7 +101,8 @@ fn crossings(values: &[f64]) -> Vec<usize> {
 
 fn sine_error(half: &[f64]) -> f64 {
     let n = half.len() as f64;
-    let shape: Vec<f64> = (0..half.len()).map(|k| (std::f64::consts::PI * (k as f64 + 0.5) / n).sin()).collect();
+    let shape: Vec<f64> =
+        (0..half.len()).map(|k| (std::f64::consts::PI * (k as f64 + 0.5) / n).sin()).collect();
     error_of(half, &shape)
 }
 
