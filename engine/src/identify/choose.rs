@@ -60,8 +60,7 @@ pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
     let mut first_error = None;
     // First order first: its dynamics start the others.
     for structure in [Structure::Fopdt, Structure::Ipdt, Structure::Sopdt, Structure::SopdtZero] {
-        let point =
-            |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
+        let point = |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
         let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
         let near = Near { first: point(Structure::Fopdt), same };
         match fit_on(problem, &stretch, structure, drift, &near) {

@@ -21,6 +21,12 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
         found.push(FitVerdict::Poor { fit_percent: fit.fit_percent });
     }
     parameters(fit, stretch, &mut found);
+    for d in &fit.disturbances {
+        let [low, high] = d.parameters[0].interval_95;
+        if low.is_nan() || high.is_nan() || low * high <= 0.0 {
+            found.push(FitVerdict::DisturbanceUnknown { name: d.name.clone() });
+        }
+    }
     found.extend(too_coarse(fit, problem));
     residuals(fit, &mut found);
     if found.is_empty() {

@@ -21,6 +21,18 @@ pub enum FitVerdict {
         /// Part of the MV's moves that follows from the PV, in percent.
         explained_percent: f64,
     },
+    /// Disturbances move the PV more than the few moves of the setpoint do.
+    Disturbed {
+        /// Fit in percent.
+        fit_percent: f64,
+        /// Part of the MV's moves that follows from the PV, in percent.
+        explained_percent: f64,
+    },
+    /// A measured disturbance that does not move the PV beyond doubt.
+    DisturbanceUnknown {
+        /// Name of its column.
+        name: String,
+    },
     /// The model explains little of the PV's movement.
     Poor {
         /// Fit in percent.
@@ -96,7 +108,7 @@ pub enum FitVerdict {
         /// Pieces fitted with a free state each.
         count: usize,
     },
-    /// The MV never moves after the first row: the start was taken to be at rest.
+    /// The start was taken to be at rest: the PV stands still ahead of the first move, or that move was the first row.
     StartsAtRest {
         /// MV before the first row, in MV units.
         mv_before: f64,
@@ -118,6 +130,15 @@ impl std::fmt::Display for FitVerdict {
                 "nothing but feedback moves {mv_name} here ({} % of its moves follow from the PV): such a stretch shows the controller, not the process, and cannot tell a gain or a dead time; move the setpoint, or the output in manual, by a step that stands out of the noise",
                 n(*explained_percent)
             ),
+            Self::Disturbed { fit_percent, explained_percent } => write!(
+                f,
+                "disturbances rule this stretch: the model explains {} % of the PV, and {} % of the MV's moves are feedback; what a few small moves of the setpoint show is no model, move it further and more often",
+                n(*fit_percent),
+                n(*explained_percent)
+            ),
+            Self::DisturbanceUnknown { name } => {
+                write!(f, "{name} does not move the PV beyond doubt here: leave it out, or record it moving")
+            }
             Self::Poor { fit_percent } => write!(
                 f,
                 "the fit is poor ({} %): the MV explains little of this PV's movement, or the structure is the wrong one",
@@ -179,7 +200,7 @@ impl std::fmt::Display for FitVerdict {
             }
             Self::StartsAtRest { mv_before } => write!(
                 f,
-                "the MV does not move after the first row: the PV was taken to be at rest with the MV at {} before it",
+                "the PV was taken to be at rest ahead of the first move, with the MV at {}",
                 n(*mv_before)
             ),
         }
@@ -191,6 +212,8 @@ impl Explain for FitVerdict {
         match self {
             Self::Good { .. } => "verdict.good",
             Self::NoExcitation { .. } => "verdict.no_excitation",
+            Self::Disturbed { .. } => "verdict.disturbed",
+            Self::DisturbanceUnknown { .. } => "verdict.disturbance_unknown",
             Self::Poor { .. } => "verdict.poor",
             Self::GainUncertain { .. } => "verdict.gain_uncertain",
             Self::ParameterUncertain { .. } => "verdict.parameter_uncertain",
@@ -217,6 +240,10 @@ impl Explain for FitVerdict {
             Self::NoExcitation { mv_name, explained_percent } => {
                 vec![("mv_name", mv_name.clone()), n("explained_percent", explained_percent)]
             }
+            Self::Disturbed { fit_percent, explained_percent } => {
+                vec![n("fit_percent", fit_percent), n("explained_percent", explained_percent)]
+            }
+            Self::DisturbanceUnknown { name } => vec![("name", name.clone())],
             Self::Poor { fit_percent } => vec![n("fit_percent", fit_percent)],
             Self::GainUncertain { percent, mv_move, mv_moved } => {
                 vec![n("percent", percent), n("mv_move", mv_move), n("mv_moved", mv_moved)]
@@ -262,7 +289,7 @@ impl FitVerdict {
     /// Whether it says that the stretch cannot tell a model at all.
     #[must_use]
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::NoExcitation { .. })
+        matches!(self, Self::NoExcitation { .. } | Self::Disturbed { .. })
     }
 
     /// One value of every variant, for the test that compares sentences and translations.
@@ -271,6 +298,8 @@ impl FitVerdict {
         vec![
             Self::Good { fit_percent: 97.4, gain: "K", gain_percent: 1.2 },
             Self::NoExcitation { mv_name: "FIC101.MV".to_owned(), explained_percent: 98.5 },
+            Self::Disturbed { fit_percent: 41.0, explained_percent: 92.0 },
+            Self::DisturbanceUnknown { name: "feed".to_owned() },
             Self::Poor { fit_percent: 12.0 },
             Self::GainUncertain { percent: 40.0, mv_move: 4.0, mv_moved: 1.0 },
             Self::ParameterUncertain { name: "T2", percent: 80.0, mv_move: 4.0 },

@@ -10,6 +10,8 @@ pub(super) struct Conditioned {
     pub keep: Vec<bool>,
     /// Rows at which the MV is at a limit.
     pub saturated: Vec<bool>,
+    /// MV with its slips mended; absent without any.
+    pub mv: Option<Vec<f64>>,
     /// What was seen.
     pub findings: Vec<RecordFinding>,
 }
@@ -52,8 +54,43 @@ pub(super) fn condition(time_s: &[f64], pv: &[f64], mv: &[f64], first_row: usize
     if let Some(step) = resolution(pv) {
         findings.push(RecordFinding::Quantised { step });
     }
-    let saturated = at_limits(mv, &mut findings);
-    Conditioned { keep, saturated, findings }
+    let slips = slips(mv);
+    let mended = (!slips.is_empty()).then(|| mended(mv, &slips));
+    if let Some(&row) = slips.first() {
+        findings.push(RecordFinding::MvSlips { count: slips.len(), row: first_row + row, value: mv[row] });
+    }
+    let saturated = at_limits(mended.as_deref().unwrap_or(mv), &mut findings);
+    Conditioned { keep, saturated, mv: mended, findings }
+}
+
+/// Single rows far outside everything else that come back to where they were: a slip of the log, not a move.
+pub(super) fn slips(values: &[f64]) -> Vec<usize> {
+    /// Ranges of the other rows beyond which no actuator goes and comes back within a row.
+    const RANGES: f64 = 3.0;
+    if values.len() < 20 {
+        return vec![];
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (sorted[sorted.len() * 5 / 100], sorted[sorted.len() * 95 / 100]);
+    // A column that rests but for one move is no measure of what is far.
+    let range = (high - low).max(0.02 * low.abs().max(high.abs()));
+    (1..values.len() - 1)
+        .filter(|&k| {
+            let (before, now, after) = (values[k - 1], values[k], values[k + 1]);
+            let away = (now - before).abs().min((now - after).abs());
+            away > RANGES * range && (after - before).abs() < 0.2 * away
+        })
+        .collect()
+}
+
+/// The values with those of some rows replaced by the row before.
+pub(super) fn mended(values: &[f64], rows: &[usize]) -> Vec<f64> {
+    let mut out = values.to_vec();
+    for &row in rows {
+        out[row] = out[row - 1];
+    }
+    out
 }
 
 /// Runs of equal values: (first row, length).
@@ -186,8 +223,8 @@ fn at_limits(mv: &[f64], findings: &mut Vec<RecordFinding>) -> Vec<bool> {
             runs.iter().copied().filter(|r| mv[r.0] == limit && r.1 >= 3).collect();
         let rows: usize = held.iter().map(|r| r.1).sum();
         if rows >= 5 && 200 * rows >= mv.len() {
-            for (first, length) in held {
-                saturated[first..first + length].fill(true);
+            for (flag, _) in saturated.iter_mut().zip(mv).filter(|(_, u)| **u == limit) {
+                *flag = true;
             }
             findings.push(RecordFinding::MvAtLimit { limit, rows });
         }
@@ -241,6 +278,18 @@ mod tests {
         let step: Vec<f64> =
             pv.iter().enumerate().map(|(k, y)| if k > 600 { y + 50.0 } else { *y }).collect();
         assert!((597..606).all(|k| condition(&t, &step, &mv, 1).keep[k]));
+    }
+
+    #[test]
+    fn a_slip_of_the_mv_is_mended_and_a_pulse_is_not() {
+        let (t, pv, mut mv) = noisy(900);
+        mv[500] = 500.0;
+        let found = condition(&t, &pv, &mv, 1);
+        assert!(matches!(found.findings[..], [RecordFinding::MvSlips { count: 1, row: 501, .. }]));
+        assert_eq!(found.mv.expect("mended")[500], 60.0);
+        let (t, pv, mut mv) = noisy(900);
+        mv[500] = 70.0;
+        assert!(condition(&t, &pv, &mv, 1).findings.is_empty());
     }
 
     #[test]

@@ -30,6 +30,15 @@ pub enum RecordFinding {
         /// Its PV.
         value: f64,
     },
+    /// Single rows of the MV far outside the others.
+    MvSlips {
+        /// Rows mended.
+        count: usize,
+        /// The first of them, as the user counts.
+        row: usize,
+        /// Its MV.
+        value: f64,
+    },
     /// The PV moves in steps.
     Quantised {
         /// Step in PV units.
@@ -49,6 +58,8 @@ pub enum RecordFinding {
         /// Rows beyond them.
         rows: usize,
     },
+    /// The PV answers a move of the MV in its own row: the log writes the MV ahead of the PV.
+    MvEarlier,
     /// The mode changes within the stretch.
     ModeChanges {
         /// How often.
@@ -107,6 +118,11 @@ impl std::fmt::Display for RecordFinding {
                 "spikes left out of the PV: {count} rows, the first is row {row} with {}",
                 n(*value)
             ),
+            Self::MvSlips { count, row, value } => write!(
+                f,
+                "slips of the MV, taken as the row before: {count} rows, the first is row {row} with {}",
+                n(*value)
+            ),
             Self::Quantised { step } => write!(f, "the PV moves in steps of {}", n(*step)),
             Self::MvAtLimit { limit, rows } => write!(
                 f,
@@ -118,6 +134,10 @@ impl std::fmt::Display for RecordFinding {
                 "the PV follows the MV only between {} and {}: it was logged ahead of its limits, {rows} rows lie beyond and were taken at the limit",
                 n(limits[0]),
                 n(limits[1])
+            ),
+            Self::MvEarlier => write!(
+                f,
+                "the PV answers a move of the MV in its own row: the log writes the MV ahead of the PV, and each MV was taken one row earlier"
             ),
             Self::ModeChanges { count, at_s, mode } => write!(
                 f,
@@ -157,9 +177,11 @@ impl Explain for RecordFinding {
             Self::Oversampled { .. } => "record.oversampled",
             Self::Frozen { .. } => "record.frozen",
             Self::Outliers { .. } => "record.outliers",
+            Self::MvSlips { .. } => "record.mv_slips",
             Self::Quantised { .. } => "record.quantised",
             Self::MvAtLimit { .. } => "record.mv_at_limit",
             Self::MvBeyondLimits { .. } => "record.mv_beyond_limits",
+            Self::MvEarlier => "record.mv_earlier",
             Self::ModeChanges { .. } => "record.mode_changes",
             Self::Oscillates { .. } => "record.oscillates",
             Self::Stiction { .. } => "record.stiction",
@@ -176,7 +198,7 @@ impl Explain for RecordFinding {
             Self::Frozen { rows, from_s, to_s, times } => {
                 vec![whole("rows", rows), n("from_s", from_s), n("to_s", to_s), whole("times", times)]
             }
-            Self::Outliers { count, row, value } => {
+            Self::Outliers { count, row, value } | Self::MvSlips { count, row, value } => {
                 vec![whole("count", count), whole("row", row), n("value", value)]
             }
             Self::Quantised { step } => vec![n("step", step)],
@@ -184,6 +206,7 @@ impl Explain for RecordFinding {
             Self::MvBeyondLimits { limits, rows } => {
                 vec![n("low", &limits[0]), n("high", &limits[1]), whole("rows", rows)]
             }
+            Self::MvEarlier => vec![],
             Self::ModeChanges { count, at_s, mode } => {
                 vec![whole("count", count), n("at_s", at_s), n("mode", mode)]
             }
@@ -217,9 +240,11 @@ impl RecordFinding {
             Self::Oversampled { rows: 4 },
             Self::Frozen { rows: 60, from_s: 120.0, to_s: 180.0, times: 2 },
             Self::Outliers { count: 3, row: 17, value: -999.0 },
+            Self::MvSlips { count: 1, row: 40, value: 500.0 },
             Self::Quantised { step: 0.35 },
             Self::MvAtLimit { limit: 100.0, rows: 42 },
             Self::MvBeyondLimits { limits: [0.0, 60.0], rows: 250 },
+            Self::MvEarlier,
             Self::ModeChanges { count: 5, at_s: 320.0, mode: 1.0 },
             Self::Oscillates { period_s: 210.0, index: 0.35 },
             Self::Stiction { index: 0.82, band: 1.4, period_s: 330.0 },

@@ -16,10 +16,12 @@ pub use controller::ControllerFit;
 pub use finding::RecordFinding;
 pub use stiction::Oscillation;
 
-use super::{Choice, FitError, FitProblem, FitVerdict, Structure, choose_model, fit_model};
+use super::{
+    Choice, FitError, FitOptions, FitProblem, FitVerdict, InitialState, Structure, choose_model, fit_model,
+};
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
-use condition::condition;
+use condition::{condition, mended, slips};
 
 /// What is asked of a study.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -76,12 +78,22 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     let mut findings = Vec::new();
     let rows = problem.time_s.len();
     let mut saturated = vec![false; rows];
+    let (mended_mv, mended_sp);
+    let mut record = record.clone();
     if !options.as_is {
         let seen = condition(problem.time_s, problem.pv, problem.mv, problem.options.first_row);
         saturated = seen.saturated;
         findings = seen.findings;
         if problem.keep.is_none() && seen.keep.iter().any(|k| !k) {
             problem.keep = Some(Cow::Owned(seen.keep));
+        }
+        if let Some(mv) = seen.mv {
+            mended_mv = mv;
+            (problem.mv, record.problem.mv) = (&mended_mv, &mended_mv);
+        }
+        if let Some(sp) = record.sp {
+            mended_sp = mended(sp, &slips(sp));
+            record.sp = Some(&mended_sp);
         }
     }
     let clipped;
@@ -96,19 +108,105 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
             problem.mv = &clipped;
         }
     }
-    let mut choice = match options.structure {
-        None => choose_model(&problem),
-        Some(structure) => fit_model(&problem, structure).map(Choice::of_one),
-    };
-    let controller = controller_of(record, &problem, &saturated, &mut findings);
-    if let Ok(choice) = &mut choice {
-        refuse_feedback(record, &problem, controller.as_ref(), choice);
-        if let Some(c) = &controller {
-            of_the_loop(c, choice, &mut findings);
+    let controller = controller_of(&record, &problem, &saturated, &mut findings);
+    let mut choice = fitted(&problem, options);
+    if starts_at_rest(&problem) {
+        let at_rest = FitOptions { initial_state: InitialState::Rest, ..problem.options.clone() };
+        let rest = fitted(&FitProblem { options: at_rest.clone(), ..problem.clone() }, options);
+        if let (Ok(free), Ok(found)) = (&choice, &rest)
+            && found.chosen().fit_percent > free.chosen().fit_percent - RESTING_PERCENT
+        {
+            problem.options = at_rest;
+            choice = rest;
         }
+    }
+    if let Ok(choice) = &mut choice {
+        refuse_feedback(&record, &problem, controller.as_ref(), choice);
+    }
+    let earlier = one_row_earlier(problem.mv);
+    if !options.as_is
+        && let Some(better) = answered_in_the_same_row(&problem, &earlier, &choice, options)
+    {
+        choice = Ok(better);
+        findings.push(RecordFinding::MvEarlier);
+    }
+    if let (Ok(choice), Some(controller)) = (&choice, &controller) {
+        of_the_loop(controller, choice, &mut findings);
     }
     let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
     Ok(LoopStudy { choice, controller, oscillation, findings })
+}
+
+fn fitted(problem: &FitProblem, options: &StudyOptions) -> Result<Choice, FitError> {
+    match options.structure {
+        None => choose_model(problem),
+        Some(structure) => fit_model(problem, structure).map(Choice::of_one),
+    }
+}
+
+/// What a start at rest may cost in fit, in points, where the rows ahead of the first move stand still.
+const RESTING_PERCENT: f64 = 10.0;
+
+/// Whether the PV stands still in the rows ahead of the first move of the MV.
+///
+/// With a free start least squares may explain a response that begins soon after the first row as the end of an
+/// earlier motion, and does so with a better fit where the process is a little non-linear. The rows ahead of the move
+/// speak against it.
+fn starts_at_rest(problem: &FitProblem) -> bool {
+    const ROWS: usize = 5;
+    /// Part of the whole movement that counts as standing still.
+    const STILL: f64 = 0.01;
+    let Some(rest) = problem.mv.windows(2).position(|w| w[0] != w[1]).map(|k| k + 1) else { return false };
+    if rest < ROWS
+        || problem.options.initial_state == InitialState::Rest
+        || problem.options.mv_before.is_some()
+    {
+        return false;
+    }
+    let rows = &problem.pv[..rest];
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let range = |values: &[f64]| {
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        high - low
+    };
+    // Ends averaged over a third, against what the scatter of that many rows leaves of a trend.
+    let third = (rest / 3).max(1);
+    let (first, last) = (&rows[..third], &rows[rest - third..]);
+    let middle = mean(rows);
+    let scatter = (rows.iter().map(|y| (y - middle).powi(2)).sum::<f64>() / rest as f64).sqrt();
+    let change = (mean(last) - mean(first)).abs();
+    change <= STILL * range(problem.pv) + 2.0 * scatter * (2.0 / third as f64).sqrt()
+}
+
+fn one_row_earlier(mv: &[f64]) -> Vec<f64> {
+    mv.iter().skip(1).chain(mv.last()).copied().collect()
+}
+
+/// The fit with every MV one row earlier, where the PV answers a move in its own row: then the log writes the MV ahead
+/// of the PV, against the convention of records.
+fn answered_in_the_same_row(
+    problem: &FitProblem,
+    earlier: &[f64],
+    choice: &Result<Choice, FitError>,
+    options: &StudyOptions,
+) -> Option<Choice> {
+    /// Correlation of the residuals with the moves of their own row, in half widths of its band.
+    const BANDS: f64 = 3.0;
+    /// The squared residual must fall to this part.
+    const FALL: f64 = 0.6;
+    let fit = choice.as_ref().ok()?.chosen();
+    if !fit.is_usable() {
+        return None;
+    }
+    let at_once = fit.tests.cross_correlation.first()?.abs() > BANDS * fit.tests.cross_correlation_band;
+    let no_dead_time = fit.parameter("L_s").is_some_and(|l| l.interval_95[0] <= 0.0);
+    if !(at_once && no_dead_time) {
+        return None;
+    }
+    let shifted = FitProblem { mv: earlier, ..problem.clone() };
+    let other = fitted(&shifted, options).ok()?;
+    (other.chosen().mse < FALL * fit.mse && other.chosen().is_usable()).then_some(other)
 }
 
 fn check_length(record: &LoopRecord) -> Result<(), FitError> {
@@ -199,6 +297,10 @@ fn refuse_feedback(
 ) {
     /// Part of the MV's moves that feedback explains where nothing else moves it.
     const FEEDBACK: f64 = 0.7;
+    /// A setpoint that moves this seldom leaves disturbances the most of the record.
+    const FEW_MOVES: usize = 5;
+    /// Fit in percent from which a few moves of the setpoint do tell the process.
+    const TOLD_PERCENT: f64 = 75.0;
     let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK) else { return };
     let still = record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]));
     let one_mode = record.mode.is_none_or(|mode| mode.iter().all(|m| *m == mode[0]));
@@ -208,6 +310,12 @@ fn refuse_feedback(
             mv_name: problem.options.mv_name.clone(),
             explained_percent: 100.0 * controller.r2,
         });
+        return;
+    }
+    let setpoint_moves = record.sp.map_or(0, |sp| sp.windows(2).filter(|w| w[0] != w[1]).count());
+    let fit_percent = choice.chosen().fit_percent;
+    if !still && setpoint_moves < FEW_MOVES && fit_percent < TOLD_PERCENT && one_mode && !other_excitation {
+        choice.refuse(&FitVerdict::Disturbed { fit_percent, explained_percent: 100.0 * controller.r2 });
     }
 }
 
