@@ -2,7 +2,8 @@
 
 use vasos_engine::analyze::{Analysis, StepFigures, analyze, step_figures};
 use vasos_engine::control::PidGains;
-use vasos_engine::document::{Document, ModelEntry};
+use vasos_engine::document::{Document, ModelEntry, ModelOrigin};
+use vasos_engine::identify::ControllerFit;
 use vasos_engine::model::ProcessModel;
 use vasos_engine::tune::{ControllerKind, Rule, RuleError, RuleOptions, RuleWarning, registry};
 
@@ -142,8 +143,13 @@ pub fn same_units(document: &Document, entry: &ModelEntry, focus: usize) -> bool
 fn key(document: &Document, entry: &ModelEntry, focus: usize) -> Key {
     let tag = document.rig.active_loops().get(focus).map(|l| l.id.clone());
     let present = tag.and_then(|t| document.rig.loops.get(&t)).map(|l| l.tuning.gains);
-    // Gains in other units than the model's say nothing on it.
-    let present = present.filter(|_| same_units(document, entry, focus));
+    // Gains in other units than the model's say nothing on it. A log has its own controller, in its own units.
+    let present = match entry.origin {
+        ModelOrigin::Log { .. } => {
+            entry.study.as_ref().and_then(|s| s.controller.as_ref()).and_then(ControllerFit::gains)
+        }
+        _ => present.filter(|_| same_units(document, entry, focus)),
+    };
     Key {
         number: entry.number,
         model: entry.model.clone(),

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, Polygon};
 use vasos_engine::document::{DocumentCommand, FittedRows, ModelEntry, NewModel};
-use vasos_engine::identify::{ControllerFit, LoopStudy, ModelFit};
+use vasos_engine::identify::{ControllerFit, FitVerdict, LoopStudy, ModelFit};
 use vasos_engine::model::ProcessModel;
 
 use super::structure_name;
 use crate::action::Action;
-use crate::panes::View;
 use crate::widgets::segmented;
 use crate::{i18n, plots, text, theme, tr};
 
@@ -28,36 +27,32 @@ pub enum Picture {
     Tests,
 }
 
-pub fn ui(
-    ui: &mut egui::Ui,
-    view: &View,
-    entry: &ModelEntry,
-    picture: &mut Picture,
-    actions: &mut Vec<Action>,
-) {
+pub fn ui(ui: &mut egui::Ui, entry: &ModelEntry, picture: &mut Picture, actions: &mut Vec<Action>) {
     heading(ui, entry, actions);
     let p = theme::palette(ui);
-    if let Some(fit) = &entry.fit {
-        for verdict in &fit.verdicts {
-            line(
-                ui,
-                &i18n::say(verdict),
-                if verdict.is_objection() { p.caution } else { p.text },
-                verdict.is_objection(),
-            );
-        }
+    let Some(fit) = &entry.fit else { return };
+    let verdict = |ui: &mut egui::Ui, verdict: &FitVerdict| {
+        let objection = verdict.is_objection();
+        line(ui, &i18n::say(verdict), if objection { p.caution } else { p.text }, objection);
+    };
+    verdict(ui, fit.verdict());
+    if let Some(rows) = &entry.rows {
+        pictures(ui, entry, fit, rows, picture);
     }
-    if let Some(study) = &entry.study {
-        for finding in &study.findings {
-            let warning = finding.is_warning();
-            line(ui, &i18n::say(finding), if warning { p.caution } else { p.weak }, warning);
-        }
-        if let Some(controller) = &study.controller {
-            let _ = view;
-            line(ui, &controller_words(controller), p.text, false);
-        }
+    for other in fit.verdicts.iter().skip(1) {
+        verdict(ui, other);
     }
-    let (Some(fit), Some(rows)) = (&entry.fit, &entry.rows) else { return };
+    let Some(study) = &entry.study else { return };
+    if let Some(controller) = &study.controller {
+        line(ui, &controller_words(controller), p.text, false);
+    }
+    for finding in &study.findings {
+        let warning = finding.is_warning();
+        line(ui, &i18n::say(finding), if warning { p.caution } else { p.weak }, warning);
+    }
+}
+
+fn pictures(ui: &mut egui::Ui, entry: &ModelEntry, fit: &ModelFit, rows: &FittedRows, picture: &mut Picture) {
     let pictures = [Picture::Data, Picture::Residuals, Picture::Step, Picture::Tests];
     let labels =
         [tr!("identify.data"), tr!("identify.residuals"), tr!("identify.step"), tr!("identify.tests")];
@@ -157,7 +152,7 @@ fn legend(ui: &mut egui::Ui, entries: &[(String, Color32)]) {
 fn frame(ui: &egui::Ui, name: &'static str, y: String) -> Plot<'static> {
     let p = theme::palette(ui);
     Plot::new(name)
-        .height(ui.available_height().clamp(120.0, 420.0))
+        .height(ui.available_height().clamp(160.0, 420.0))
         .allow_scroll(false)
         .custom_y_axes(vec![plots::y_axis(y)])
         .grid_color(p.grid)

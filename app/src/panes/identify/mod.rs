@@ -47,7 +47,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             type_model(ui, view, state, &mut actions);
         }
         if let Some(entry) = view.document.model() {
-            evidence::ui(ui, view, entry, &mut state.picture, &mut actions);
+            evidence::ui(ui, entry, &mut state.picture, &mut actions);
         } else {
             ui.add(
                 egui::Label::new(RichText::new(tr!("identify.hint")).color(theme::palette(ui).weak)).wrap(),
@@ -61,28 +61,24 @@ fn source(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<A
     let document = view.document;
     let is_log = document.source == SourceChoice::Log;
     if let (true, Some(log)) = (is_log, &document.log) {
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 3.0;
-            let width = (ui.available_width() - 142.0) / 3.0;
-            let mut roles = document.roles;
-            let mut changed = false;
-            for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
-                changed |= column_choice(ui, what, role, log, width);
-            }
-            ui.end_row();
-            let others = [
-                (tr!("identify.mode"), &mut roles.mode, tr!("identify.mode_hint")),
-                (tr!("identify.disturbance"), &mut roles.disturbance, tr!("identify.disturbance_hint")),
-            ];
-            for (what, role, hint) in others {
-                ui.scope(|ui| changed |= column_choice(ui, &what, role, log, width))
-                    .response
-                    .on_hover_text(hint);
-            }
-            if changed {
-                actions.push(Action::Document(DocumentCommand::Roles(roles)));
-            }
-        });
+        let mut roles = document.roles;
+        let mut changed = false;
+        let mode = (tr!("identify.mode"), &mut roles.mode);
+        let disturbance = (tr!("identify.disturbance"), &mut roles.disturbance);
+        let named = [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)];
+        let lines = [named.map(|(what, role)| (what.to_owned(), role)).into(), vec![mode, disturbance]];
+        for line in lines {
+            ui.horizontal_wrapped(|ui| {
+                ui.spacing_mut().item_spacing.x = 3.0;
+                let width = (ui.available_width() - 142.0) / 3.0;
+                for (what, role) in line {
+                    changed |= column_choice(ui, &what, role, log, width);
+                }
+            });
+        }
+        if changed {
+            actions.push(Action::Document(DocumentCommand::Roles(roles)));
+        }
         ui.horizontal(|ui| {
             let mut known = state.mv_before.is_some();
             ui.checkbox(&mut known, tr!("identify.mv_before")).on_hover_text(tr!("identify.mv_before_hint"));

@@ -66,7 +66,8 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
     };
     // Long units of logs push the other columns out; they stand under the pointer.
     let unit = text::quotient(&entry.pv_unit, &entry.mv_unit);
-    let unit = if unit.chars().count() <= 8 { format!(" {unit}") } else { String::new() };
+    let known = !(entry.pv_unit.is_empty() && entry.mv_unit.is_empty());
+    let unit = if known && unit.chars().count() <= 8 { format!(" {unit}") } else { String::new() };
     cell(ui, find("K"), &unit);
     cell(ui, find("T_s"), "");
     cell(ui, find("L_s"), "");
