@@ -9,6 +9,7 @@ pub mod analyze;
 pub mod control;
 pub mod daq;
 pub mod document;
+pub mod excitation;
 pub mod experiment;
 pub mod explain;
 pub mod identify;
