@@ -10,25 +10,25 @@ pub enum ExcitationError {
     #[error(transparent)]
     Value(#[from] RigError),
     /// Another experiment runs.
-    #[error("{tag} is in an experiment; end that one first")]
+    #[error("a test runs on {tag}; end that one first")]
     Busy {
         /// Loop of the experiment that runs.
         tag: String,
     },
     /// None to end.
-    #[error("{tag} is in no experiment")]
+    #[error("no test runs on {tag}")]
     NotRunning {
         /// Loop.
         tag: String,
     },
     /// No valid PV to begin with.
-    #[error("{tag} has no valid PV: repair its sensor before an experiment")]
+    #[error("{tag} has no valid PV: a test needs its sensor")]
     NoPv {
         /// Loop.
         tag: String,
     },
     /// The PV is outside the limits it is to keep.
-    #[error("{tag}: the PV is {}, outside the experiment's limits {} to {}", number(*.pv), number(*.low), number(*.high))]
+    #[error("{tag}: the PV is {}, outside the limits of the test, {} to {}", number(*.pv), number(*.low), number(*.high))]
     PvOutside {
         /// Loop.
         tag: String,

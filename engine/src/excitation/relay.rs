@@ -154,7 +154,11 @@ impl RelayMachine {
             let high = self.last().map(|c| of(&c)).fold(f64::MIN, f64::max);
             high - low <= self.relay.agreement * high + beyond
         };
-        within(|c| c.period_s, 2.0 * self.sample_time_s) && within(|c| c.amplitude, SURE * self.noise_sd)
+        // Noise moves a switch by σ over the slope, 4a a period for a triangle.
+        let slope = |c: &Cycle| 4.0 * c.amplitude / c.period_s;
+        let steepest = self.last().map(|c| slope(&c)).fold(f64::MIN_POSITIVE, f64::max);
+        let noise = SURE * self.noise_sd;
+        within(|c| c.period_s, 2.0 * self.sample_time_s + noise / steepest) && within(|c| c.amplitude, noise)
     }
 
     fn mean(&self, of: fn(&Cycle) -> f64) -> Option<f64> {

@@ -192,6 +192,15 @@ pub enum ExcitationWarning {
         /// ε/a.
         ratio: f64,
     },
+    /// The fitted model turns the other way than the first pulse did.
+    #[error(
+        "the model of the record has the gain {}, but the first pulse found the other sign: the answer is too small for the noise, or periodic; take a larger amplitude or more hysteresis",
+        number(*.gain)
+    )]
+    OtherSign {
+        /// K of the model in PV units per MV unit.
+        gain: f64,
+    },
     /// Frequencies without an answer.
     #[error("{found} of {wanted} frequencies were measured")]
     MissingFrequencies {
@@ -206,6 +215,7 @@ impl Explain for ExcitationWarning {
     fn key(&self) -> &'static str {
         match self {
             Self::WideHysteresis { .. } => "excitation_warning.wide_hysteresis",
+            Self::OtherSign { .. } => "excitation_warning.other_sign",
             Self::MissingFrequencies { .. } => "excitation_warning.missing_frequencies",
         }
     }
@@ -213,6 +223,7 @@ impl Explain for ExcitationWarning {
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::WideHysteresis { ratio } => vec![("ratio", number(*ratio))],
+            Self::OtherSign { gain } => vec![("gain", number(*gain))],
             Self::MissingFrequencies { found, wanted } => {
                 vec![("found", found.to_string()), ("wanted", wanted.to_string())]
             }
@@ -224,7 +235,11 @@ impl ExcitationWarning {
     /// One of each kind, for the test that compares them with the translation files.
     #[must_use]
     pub fn samples() -> Vec<Self> {
-        vec![Self::WideHysteresis { ratio: 0.42 }, Self::MissingFrequencies { found: 3, wanted: 5 }]
+        vec![
+            Self::WideHysteresis { ratio: 0.42 },
+            Self::OtherSign { gain: -0.25 },
+            Self::MissingFrequencies { found: 3, wanted: 5 },
+        ]
     }
 }
 
@@ -235,6 +250,8 @@ pub struct Identified {
     pub fit: FopdtFit,
     /// Ku and Pu of that model; absent where no proportional gain brings it to its limit.
     pub ultimate: Option<Ultimate>,
+    /// What has to be said about it besides the verdicts of the fit.
+    pub warnings: Vec<ExcitationWarning>,
 }
 
 /// Fits a first-order model with dead time to the record of an experiment by output error.
@@ -245,5 +262,12 @@ pub fn identify_report(report: &ExcitationReport) -> Result<Identified, FitError
     let Record { time_s, pv, mv, .. } = &report.record;
     let fit = fit_fopdt(&FitProblem::new(time_s, pv, mv))?;
     let ultimate = ultimate(&ProcessModel::Fopdt(fit.model));
-    Ok(Identified { fit, ultimate })
+    let found = match &report.finding {
+        Finding::Relay(relay) => Some(relay.ku),
+        Finding::Ultimate(found) => Some(found.ku),
+        _ => None,
+    };
+    let gain = fit.model.gain;
+    let turned = found.filter(|ku| ku * gain < 0.0).map(|_| ExcitationWarning::OtherSign { gain });
+    Ok(Identified { fit, ultimate, warnings: turned.into_iter().collect() })
 }

@@ -255,6 +255,10 @@ impl ExcitationRun {
                     _ => Drive::Output(self.envelope.mv.clamp(base.mv + by)),
                 }
             }
+            Order::NoOscillation(gain) => {
+                self.stop(StopReason::NoOscillation { gain });
+                Drive::Leave
+            }
             Order::Done => {
                 self.finding = machine.finding();
                 self.end(Ending::Finished);

@@ -28,6 +28,8 @@ pub(super) enum Order {
     Move(f64),
     /// All is measured.
     Done,
+    /// Nothing can be measured: no gain up to this one, in MV units per PV unit, makes an oscillation.
+    NoOscillation(f64),
 }
 
 /// How far a machine is.
@@ -120,8 +122,8 @@ impl Machine {
         each!(self, machine => machine.state())
     }
 
-    /// What was measured, once it is done.
-    pub fn finding(&self) -> Finding {
+    /// What was measured, given away once it is done.
+    pub fn finding(&mut self) -> Finding {
         each!(self, machine => machine.finding())
     }
 }

@@ -174,7 +174,7 @@ impl SineMachine {
         }
     }
 
-    pub fn finding(&self) -> Finding {
-        Finding::Frequencies(self.points.clone())
+    pub fn finding(&mut self) -> Finding {
+        Finding::Frequencies(std::mem::take(&mut self.points))
     }
 }

@@ -34,6 +34,14 @@ pub enum StopReason {
         /// The time in seconds.
         budget_s: f64,
     },
+    /// A gain so high that noise alone fills the output's range, or far from where it began, and nothing swings.
+    #[error(
+        "ended at the gain {}: no oscillation stands out of the noise; give a larger kick, or use a relay", number(*.gain)
+    )]
+    NoOscillation {
+        /// The last gain in MV units per PV unit.
+        gain: f64,
+    },
     /// The loop was not at rest; nothing was moved.
     #[error(
         "not begun: in {} s the PV moved by {}, and at rest it would move by {} at most",
@@ -75,6 +83,7 @@ impl Explain for StopReason {
             Self::PvLimit { .. } => "excitation_stop.pv_limit",
             Self::PvLost => "excitation_stop.pv_lost",
             Self::Budget { .. } => "excitation_stop.budget",
+            Self::NoOscillation { .. } => "excitation_stop.no_oscillation",
             Self::NotAtRest { .. } => "excitation_stop.not_at_rest",
             Self::NoRoom(_) => "excitation_stop.no_room",
             Self::Unlinked => "excitation_stop.unlinked",
@@ -92,6 +101,7 @@ impl Explain for StopReason {
                 vec![("pv", number(*pv)), ("low", number(*low)), ("high", number(*high))]
             }
             Self::Budget { budget_s } => vec![("budget_s", number(*budget_s))],
+            Self::NoOscillation { gain } => vec![("gain", number(*gain))],
             Self::NotAtRest { listen_s, moved, band } => {
                 vec![("listen_s", number(*listen_s)), ("moved", number(*moved)), ("band", number(*band))]
             }
@@ -120,6 +130,7 @@ impl StopReason {
             Self::PvLimit { pv: 21.0, low: 10.0, high: 20.0 },
             Self::PvLost,
             Self::Budget { budget_s: 3600.0 },
+            Self::NoOscillation { gain: 42.0 },
             Self::NotAtRest { listen_s: 30.0, moved: 0.4, band: 0.05 },
             Self::NoRoom(room),
             Self::Unlinked,

@@ -25,8 +25,12 @@ const SURE: f64 = 3.0;
 const PATIENCE: f64 = 4.0;
 /// Times the band in which crossings are not seen, under which peaks are more noise than oscillation.
 const FLOOR: f64 = 4.0;
+/// Share of the peak after a kick, under which the oscillation has died out.
+const DIED_OUT: f64 = 0.02;
 /// Logarithmic growth that stands for an oscillation at the limits of the output.
 const CUT: f64 = 0.5;
+/// Times the gain at the start, at which the search is given up.
+const HOPELESS: f64 = 1e4;
 /// Widest ratio of two gains between which the ultimate one is not sought any further.
 const CLOSE: f64 = 1.005;
 
@@ -54,6 +58,8 @@ pub(super) struct UltimateMachine {
     heard: usize,
     sign: f64,
     kick_s: f64,
+    /// First peak after the last kick in PV units.
+    kicked: Option<f64>,
     gain: f64,
     gains: u32,
     /// Side of the PV, 0 before the first crossing.
@@ -85,6 +91,7 @@ impl UltimateMachine {
             heard: 0,
             sign: 1.0,
             kick_s: 0.0,
+            kicked: None,
             gain: test.start_gain,
             gains: 1,
             side: 0.0,
@@ -124,10 +131,13 @@ impl UltimateMachine {
         if self.found.is_some() {
             return Order::Done;
         }
+        let [low, high] = self.room;
+        if self.gain * self.blind > high - low || self.gain > HOPELESS * self.test.start_gain {
+            return Order::NoOscillation(self.sign * self.gain);
+        }
         if let Doing::Kick { .. } = self.doing {
             return Order::Move(self.kick());
         }
-        let [low, high] = self.room;
         let wanted = -self.sign * self.gain * y;
         self.cut |= !(low..=high).contains(&wanted) && self.skipped >= SKIPPED;
         Order::Move(wanted.clamp(low, high))
@@ -181,7 +191,9 @@ impl UltimateMachine {
 
     /// A half cycle has ended.
     fn half_cycle(&mut self, now_s: f64) {
-        if self.skipped < SKIPPED {
+        let kicked = *self.kicked.get_or_insert(self.largest);
+        let floor = (FLOOR * self.blind).max(DIED_OUT * kicked);
+        if self.skipped < SKIPPED && self.largest >= floor {
             self.skipped += 1;
             return;
         }
@@ -189,7 +201,7 @@ impl UltimateMachine {
         self.times_s[self.seen] = now_s;
         self.seen += 1;
         self.last_peak = Some(self.largest);
-        if self.largest < FLOOR * self.blind {
+        if self.largest < floor {
             self.nothing_swings(now_s);
             return;
         }
@@ -197,8 +209,13 @@ impl UltimateMachine {
             self.last_period_s = Some(self.period_s());
         }
         if self.seen > 2 * self.test.cycles as usize {
-            let growth = if self.cut { CUT } else { self.growth() };
-            self.judge(growth, now_s);
+            let growth = self.growth();
+            if self.cut && growth < -self.test.agreement {
+                // It dies out of the limits; what it does within them is yet to be seen.
+                self.begin(now_s);
+                return;
+            }
+            self.judge(if self.cut { growth.max(CUT) } else { growth }, now_s);
         }
     }
 
@@ -226,6 +243,7 @@ impl UltimateMachine {
         let growth = if self.seen >= 3 { self.growth().min(-self.test.agreement) } else { -1.0 };
         self.next_gain(growth);
         self.doing = Doing::Kick { until_s: now_s + self.kick_s };
+        self.kicked = None;
     }
 
     fn judge(&mut self, growth: f64, now_s: f64) {
