@@ -236,6 +236,7 @@ fn measured(finding: &Finding) -> Vec<(&'static str, Option<f64>)> {
             ("Ku", Some(relay.ku)),
             ("Ku_hysteresis", relay.ku_hysteresis),
             ("static_gain", relay.static_gain),
+            ("static_gain_error", relay.static_gain_error),
         ],
         Finding::Ultimate(found) => vec![("Ku", Some(found.ku)), ("Pu_s", Some(found.pu_s))],
         Finding::Frequencies(_) | Finding::Nothing => vec![],

@@ -18,6 +18,10 @@ const SMOOTHED: usize = 4;
 /// Standard deviations of the noise by which the first pulse has to move the PV, and two amplitudes may differ.
 const SURE: f64 = 3.0;
 
+/// The mean output of a cycle, as a share of the relay's amplitude, must be that many times the noise, as a share of the
+/// cycle's amplitude, to tell the static gain.
+const TELLING: f64 = 2.0;
+
 /// One cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Cycle {
@@ -166,6 +170,19 @@ impl RelayMachine {
         (count > 0).then(|| self.last().map(|c| of(&c)).sum::<f64>() / count as f64)
     }
 
+    /// ∫y dt/∫u dt over the last cycles, and its standard error as they differ among each other. Where the process
+    /// integrates over a cycle, the mean output is close to that at rest, and noise alone decides the ratio.
+    fn static_gain(&self) -> Option<(f64, f64)> {
+        let count = self.last().count() as f64;
+        let gain = self.mean(|c| c.pv_integral)? / self.mean(|c| c.mv_integral)?;
+        let squares: f64 = self.last().map(|c| (c.pv_integral - gain * c.mv_integral).powi(2)).sum();
+        let error = (squares / (count * (count - 1.0))).sqrt() / self.mean(|c| c.mv_integral)?.abs();
+        let mean_mv = self.mean(|c| c.mv_integral)? / self.mean(|c| c.period_s)?;
+        let share = mean_mv.abs() / (0.5 * (self.relay.amplitude + self.relay.down()));
+        let tells = share > TELLING * self.noise_sd / self.mean(|c| c.amplitude)?;
+        (tells && gain.is_finite() && error.is_finite()).then_some((gain, error))
+    }
+
     pub fn state(&self) -> State {
         let phase = if self.sign.is_none() { Phase::FirstPulse } else { Phase::Cycling };
         State {
@@ -185,7 +202,7 @@ impl RelayMachine {
         let under_root = amplitude * amplitude - self.width * self.width;
         let with_hysteresis = 4.0 * d / (std::f64::consts::PI * under_root.max(0.0).sqrt());
         let asymmetric = self.relay.amplitude != self.relay.down();
-        let gain = self.mean(|c| c.pv_integral).zip(self.mean(|c| c.mv_integral)).map(|(pv, mv)| pv / mv);
+        let gain = asymmetric.then(|| self.static_gain()).flatten();
         Finding::Relay(RelayFinding {
             period_s,
             omega_rad_s: 2.0 * std::f64::consts::PI / period_s,
@@ -194,7 +211,8 @@ impl RelayMachine {
             cycles: self.relay.cycles,
             ku: sign * describing,
             ku_hysteresis: (under_root > 0.0).then_some(sign * with_hysteresis),
-            static_gain: gain.filter(|k| asymmetric && k.is_finite()),
+            static_gain: gain.map(|(gain, _)| gain),
+            static_gain_error: gain.map(|(_, error)| error),
         })
     }
 }

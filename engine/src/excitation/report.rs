@@ -83,8 +83,11 @@ pub struct RelayFinding {
     pub ku: f64,
     /// 4d/(π√(a² − ε²)) with the sign of the gain; absent for a ≤ ε.
     pub ku_hysteresis: Option<f64>,
-    /// K = ∫(y − y0)/∫(u − u0) over whole cycles, of an asymmetric relay.
+    /// K = ∫(y − y0)/∫(u − u0) over whole cycles, of an asymmetric relay; absent where the mean
+    /// output is lost in the noise, as with a process much slower than the cycle.
     pub static_gain: Option<f64>,
+    /// Its standard error, as the cycles differ among each other.
+    pub static_gain_error: Option<f64>,
 }
 
 impl RelayFinding {

@@ -4,7 +4,7 @@
 //! counted from rest. The logarithm of the amplitude's ratio from cycle to cycle is judged at each gain: below 0 it dies
 //! out and the gain is raised by a factor, above 0 it grows; between two such gains the next is where the line through
 //! both (over ln K) crosses 0. An oscillation that the output's limits cut holds at any gain above the ultimate one: it
-//! counts as growing.
+//! counts as growing. What grew is calmed with half the gain before the next one is tried.
 //!
 //! Source: Ziegler & Nichols, Trans. ASME 64 (1942) 759.
 
@@ -25,6 +25,8 @@ const SURE: f64 = 3.0;
 const PATIENCE: f64 = 4.0;
 /// Times the band in which crossings are not seen, under which peaks are more noise than oscillation.
 const FLOOR: f64 = 4.0;
+/// Times the peak after a kick, beyond which an oscillation has grown and is calmed.
+const GROWN: f64 = 3.0;
 /// Share of the peak after a kick, under which the oscillation has died out.
 const DIED_OUT: f64 = 0.02;
 /// Logarithmic growth that stands for an oscillation at the limits of the output.
@@ -45,6 +47,8 @@ enum Doing {
     Kick { until_s: f64 },
     /// Control.
     Control,
+    /// Control with half the gain, until an oscillation that grew is as small as after the kick.
+    Calm,
 }
 
 #[derive(Debug, Clone)]
@@ -126,7 +130,7 @@ impl UltimateMachine {
             }
             Doing::Kick { until_s } if t_s < until_s => return Order::Move(self.kick()),
             Doing::Kick { .. } => self.begin(t_s),
-            Doing::Control => self.watch(t_s, y),
+            Doing::Control | Doing::Calm => self.watch(t_s, y),
         }
         if self.found.is_some() {
             return Order::Done;
@@ -138,7 +142,8 @@ impl UltimateMachine {
         if let Doing::Kick { .. } = self.doing {
             return Order::Move(self.kick());
         }
-        let wanted = -self.sign * self.gain * y;
+        let gain = if self.doing == Doing::Calm { 0.5 * self.gain } else { self.gain };
+        let wanted = -self.sign * gain * y;
         self.cut |= !(low..=high).contains(&wanted) && self.skipped >= SKIPPED;
         Order::Move(wanted.clamp(low, high))
     }
@@ -192,6 +197,12 @@ impl UltimateMachine {
     /// A half cycle has ended.
     fn half_cycle(&mut self, now_s: f64) {
         let kicked = *self.kicked.get_or_insert(self.largest);
+        if self.doing == Doing::Calm {
+            if self.largest <= kicked {
+                self.begin(now_s);
+            }
+            return;
+        }
         let floor = (FLOOR * self.blind).max(DIED_OUT * kicked);
         if self.skipped < SKIPPED && self.largest >= floor {
             self.skipped += 1;
@@ -208,7 +219,8 @@ impl UltimateMachine {
         if self.seen >= 3 {
             self.last_period_s = Some(self.period_s());
         }
-        if self.seen > 2 * self.test.cycles as usize {
+        let grown = self.seen >= 3 && self.largest > GROWN * kicked;
+        if grown || self.seen > 2 * self.test.cycles as usize {
             let growth = self.growth();
             if self.cut && growth < -self.test.agreement {
                 // It dies out of the limits; what it does within them is yet to be seen.
@@ -240,8 +252,10 @@ impl UltimateMachine {
 
     /// The gain is far too low, or the oscillation went under in the noise: another gain and another kick.
     fn nothing_swings(&mut self, now_s: f64) {
-        let growth = if self.seen >= 3 { self.growth().min(-self.test.agreement) } else { -1.0 };
-        self.next_gain(growth);
+        if self.doing != Doing::Calm {
+            let growth = if self.seen >= 3 { self.growth().min(-self.test.agreement) } else { -1.0 };
+            self.next_gain(growth);
+        }
         self.doing = Doing::Kick { until_s: now_s + self.kick_s };
         self.kicked = None;
     }
@@ -259,6 +273,9 @@ impl UltimateMachine {
             return;
         }
         self.begin(now_s);
+        if self.last_peak.zip(self.kicked).is_some_and(|(last, kicked)| last > GROWN * kicked) {
+            self.doing = Doing::Calm;
+        }
     }
 
     /// The gain at which the line through what was seen crosses 0.
@@ -291,7 +308,7 @@ impl UltimateMachine {
     pub fn state(&self) -> State {
         let phase = match self.doing {
             Doing::FirstKick => Phase::FirstPulse,
-            Doing::Kick { .. } | Doing::Control => Phase::Raising,
+            Doing::Kick { .. } | Doing::Control | Doing::Calm => Phase::Raising,
         };
         State {
             cycle: self.gains,
