@@ -9,9 +9,11 @@
 //! the samples, and a sample allocates nothing. Policy for non-finite numbers: a description that holds one is refused, a
 //! PV that is none ends the run, and no output is ever other than finite.
 
+mod check;
 mod error;
 mod listening;
 mod prbs;
+mod progress;
 mod relay;
 mod report;
 mod rest;
@@ -28,11 +30,12 @@ mod ultimate_gain;
 
 pub use error::ExcitationError;
 pub use prbs::{prbs_length, prbs_signs};
+pub use progress::{Circumstances, Drive, Envelope, Phase, Progress, Restore};
 pub use report::{
     Ending, ExcitationReport, ExcitationWarning, Finding, FrequencyPoint, Identified, Record, RelayFinding,
     StepFinding, UltimateFinding, identify_report,
 };
-pub use run::{Circumstances, Drive, Envelope, ExcitationRun, Phase, Progress, Restore};
+pub use run::ExcitationRun;
 pub use spec::{
     AtRest, Excitation, ExcitationLimits, Hysteresis, Relay, Signal, StepEnd, SteppedSine, UltimateGain,
 };

@@ -6,8 +6,8 @@
 //!
 //! Source: Åström & Hägglund, Automatica 20 (1984) 645; hysteresis from the noise: Campos et al., CBA 2014.
 
+use super::progress::Phase;
 use super::report::{Finding, RelayFinding};
-use super::run::Phase;
 use super::signal::{Ground, Heard, Order, State};
 use super::spec::Relay;
 

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::run::Envelope;
+use super::progress::Envelope;
 use super::spec::{Excitation, Signal};
 use super::stop::StopReason;
 use crate::explain::{Explain, number};

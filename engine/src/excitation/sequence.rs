@@ -1,9 +1,9 @@
 //! Signals whose course is known beforehand: the doublet and the binary sequence.
 
 use super::prbs::{ShiftRegister, prbs_length};
+use super::progress::Phase;
 use super::report::Finding;
 use super::rest::RestDetector;
-use super::run::Phase;
 use super::signal::{Ground, Heard, Order, State};
 
 /// Share of the largest deviation that a PV after a doublet may still move by at rest.

@@ -1,9 +1,9 @@
 //! The machine behind each signal, and what all of them hear and answer.
 
 use super::listening::Base;
+use super::progress::Phase;
 use super::relay::RelayMachine;
 use super::report::Finding;
-use super::run::Phase;
 use super::sequence::{DoubletMachine, PrbsMachine};
 use super::sine::SineMachine;
 use super::spec::{Hysteresis, Signal};

@@ -7,8 +7,8 @@
 use nalgebra::{Matrix4, Vector4};
 use num_complex::Complex64;
 
+use super::progress::Phase;
 use super::report::{Finding, FrequencyPoint};
-use super::run::Phase;
 use super::signal::{Ground, Heard, Order, State};
 use super::spec::SteppedSine;
 

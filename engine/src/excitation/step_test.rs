@@ -1,8 +1,8 @@
 //! A step of the output or of the setpoint, held until the PV has come to rest.
 
+use super::progress::Phase;
 use super::report::{Finding, StepFinding};
 use super::rest::RestDetector;
-use super::run::Phase;
 use super::signal::{Ground, Heard, Order, State};
 
 #[derive(Debug, Clone)]

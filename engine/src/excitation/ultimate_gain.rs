@@ -8,8 +8,8 @@
 //!
 //! Source: Ziegler & Nichols, Trans. ASME 64 (1942) 759.
 
+use super::progress::Phase;
 use super::report::{Finding, UltimateFinding};
-use super::run::Phase;
 use super::signal::{Ground, Heard, Order, State};
 use super::spec::UltimateGain;
 
