@@ -1,14 +1,16 @@
 //! Tests on the loops of running rigs: what they measure, and that they leave the loop as it was however they end.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use vasos_engine::control::{Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning};
+use vasos_engine::daq::{RigControls, Source};
 use vasos_engine::excitation::{
     AtRest, Ending, Excitation, ExcitationError, ExcitationReport, Finding, Hysteresis, Phase, Relay, Signal,
     StepEnd, SteppedSine, StopReason, UltimateGain, identify_report,
 };
-use vasos_engine::plant::{Fault, Measurement};
+use vasos_engine::plant::{Fault, Measurement, Network, Plant, Reading, ReadingStatus, RigError};
 use vasos_engine::session::{CommandError, EventKind, Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::sim::{ActiveLoop, ClosedLoop, run_excitation};
 use vasos_io::rig::{load_scenario, parse_rig, preset, write_run_csv};
@@ -151,10 +153,13 @@ fn under_way(mode: Mode) -> ClosedLoop {
     closed
 }
 
+/// A name, what is done, and whether a reason is the one that follows.
+type End = (&'static str, fn(&mut ClosedLoop), fn(&StopReason) -> bool);
+
 #[test]
 fn whatever_ends_a_test_the_loop_is_as_it_was() {
     for mode in [Mode::Automatic, Mode::Manual] {
-        let ends: [(&str, fn(&mut ClosedLoop), fn(&StopReason) -> bool); 4] = [
+        let ends: [End; 4] = [
             (
                 "abort",
                 |c| c.apply(&RigCommand::AbortExcitation { tag: tag() }).expect("possible"),
@@ -337,6 +342,77 @@ fn a_relay_on_the_noisy_rig_tells_the_ultimate_gain_by_its_model() {
     assert_eq!(run.column("mv").expect("a column"), report.record.mv);
 }
 
+/// A first-order process behind the trait that live devices implement: no plant, no valves, nothing to set.
+struct Device {
+    network: Arc<Network>,
+    level_cm: f64,
+    input: f64,
+    pipe: VecDeque<f64>,
+}
+
+impl Device {
+    /// K = 4 cm/V, T = 40 s, L = 3 s, at rest at 10 cm with 2 V.
+    fn new() -> Self {
+        let network = preset("stad").expect("preset");
+        Self { network, level_cm: 10.0, input: 2.0, pipe: VecDeque::from(vec![2.0; 15]) }
+    }
+}
+
+impl Source for Device {
+    fn network(&self) -> &Arc<Network> {
+        &self.network
+    }
+
+    fn read(&mut self, readings: &mut [Reading]) {
+        readings.fill(Reading { level_cm: self.level_cm, status: ReadingStatus::Good });
+    }
+
+    fn write(&mut self, _: usize, mv: f64) -> Result<f64, RigError> {
+        self.input = mv.clamp(1.0, 3.5);
+        Ok(self.input)
+    }
+
+    fn advance(&mut self, duration_s: f64) {
+        self.pipe.push_back(self.input);
+        let input = self.pipe.pop_front().unwrap_or(self.input);
+        let share = -(-duration_s / 40.0).exp_m1();
+        self.level_cm += share * (10.0 + 4.0 * (input - 2.0) - self.level_cm);
+    }
+
+    fn accelerates(&self) -> bool {
+        false
+    }
+
+    fn rig(&mut self) -> Option<&mut dyn RigControls> {
+        None
+    }
+
+    fn measurement(&self) -> Option<Measurement> {
+        None
+    }
+
+    fn plant(&self) -> Option<&Plant> {
+        None
+    }
+}
+
+#[test]
+fn a_live_source_is_tested_through_the_same_trait() {
+    let mut live = ClosedLoop::new(Box::new(Device::new()), 0);
+    live.apply(&RigCommand::Mode { tag: tag(), mode: Mode::Manual }).expect("possible");
+    live.apply(&RigCommand::Mv { tag: tag(), value: 2.0 }).expect("possible");
+    live.step();
+    let relay = Excitation::new(Signal::Relay(Relay { amplitude_down: Some(0.3), ..Relay::new(0.5) }));
+    begin(&mut live, &relay).expect("begins");
+    let report = to_its_end(&mut live);
+    assert_eq!(report.ending, Ending::Finished);
+    assert_eq!(live.loops()[0].control.mv(), 2.0);
+    let model = identify_report(&report).expect("a model").fit.model;
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
+    assert!(near(model.gain, 4.0) && near(model.time_constant_s, 40.0), "{model:?}");
+    assert!(near(model.dead_time_s, 3.0), "{model:?}");
+}
+
 /// SimTank with three tanks, the level of the third over that of the first.
 fn cascade() -> ClosedLoop {
     let text = vasos_io::rig::PRESETS.iter().find(|p| p.id == "simtank3").expect("preset").text;
@@ -439,7 +515,7 @@ fn a_session_tells_how_a_test_goes_on_and_what_came_of_it() {
     let mut kinds = vec![];
     wait("its end", || {
         kinds.extend(session.events().map(|e| e.kind));
-        drop(session.samples().count());
+        session.samples().for_each(drop);
         kinds.iter().any(|k| matches!(k, EventKind::ExcitationEnded(_)))
     });
     assert!(session.send(SessionCommand::Pause));

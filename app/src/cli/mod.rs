@@ -60,7 +60,7 @@ pub enum Command {
     /// Linearise a rig at rest: state space, poles, zeros, transfer functions, gains, low-order models.
     Model(model::Arguments),
     /// Run a test on a loop of a simulated rig (step, relay, binary sequence, sines and others), and fit its model.
-    Excite(excite::Arguments),
+    Excite(Box<excite::Arguments>),
     /// Run models side by side on one input, against a recording.
     Compare(compare::Arguments),
     /// Fit a process model to a log.
