@@ -1,321 +1,43 @@
-//! Tests on the loops of running rigs: what they measure, and that they leave the loop as it was however they end.
+//! Tests on the loops of running rigs: what they measure, in cascades, sessions, files and on live sources.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use vasos_engine::control::{Law, LoopOptions, Mode, OutputLimits, PidGains, PidTuning};
+use vasos_engine::control::{Clip, Law, Mode, Sends};
 use vasos_engine::daq::{RigControls, Source};
 use vasos_engine::excitation::{
     AtRest, Ending, Excitation, ExcitationError, ExcitationReport, Finding, Hysteresis, Phase, Relay, Signal,
-    StepEnd, SteppedSine, StopReason, UltimateGain, identify_report,
+    StepEnd, StopReason, UltimateGain, identify_report,
 };
 use vasos_engine::plant::{Fault, Measurement, Network, Plant, Reading, ReadingStatus, RigError};
 use vasos_engine::session::{CommandError, EventKind, Rig, RigCommand, Session, SessionCommand};
-use vasos_engine::sim::{ActiveLoop, ClosedLoop, run_excitation};
+use vasos_engine::sim::{ClosedLoop, run_excitation};
 use vasos_io::rig::{load_scenario, parse_rig, preset, write_run_csv};
-
-const TAG: &str = "LIC-02";
-
-fn tag() -> String {
-    TAG.to_owned()
-}
+use vasos_tests::{TAG, begin, checked_step, excite, relay_test, tag, tested_rig, to_its_end};
 
 fn rig(measurement: Measurement) -> Rig {
     Rig { network: preset("stad").expect("preset"), configuration: 0, measurement, seed: 3 }
 }
 
-fn closed(mode: Mode, measurement: Measurement) -> ClosedLoop {
-    let mut closed =
-        ClosedLoop::simulated(preset("stad").expect("preset"), 0, measurement, 3).expect("starts");
-    closed.apply(&RigCommand::Mode { tag: tag(), mode }).expect("possible");
-    for _ in 0..10 {
-        closed.step();
-    }
-    closed
-}
-
-fn excite(signal: Signal) -> Excitation {
-    Excitation { at_rest: AtRest::NotNeeded, listen_s: 10.0, ..Excitation::new(signal) }
-}
-
-fn begin(closed: &mut ClosedLoop, excitation: &Excitation) -> Result<(), CommandError> {
-    closed.apply(&RigCommand::Excite { tag: tag(), excitation: Box::new(excitation.clone()) })
-}
-
-fn relay() -> Excitation {
-    excite(Signal::Relay(Relay { hysteresis: Hysteresis::Given(0.1), ..Relay::new(0.3) }))
-}
-
-fn signals() -> Vec<Signal> {
-    vec![
-        Signal::Step { size: 0.1, rest_share: 0.05, end: StepEnd::Back },
-        Signal::SetpointStep { size: 1.0, rest_share: 0.05, end: StepEnd::Back },
-        Signal::Relay(Relay { hysteresis: Hysteresis::Given(0.1), ..Relay::new(0.3) }),
-        Signal::Doublet { amplitude: 0.2, hold_s: 60.0 },
-        Signal::Prbs { amplitude: 0.2, clock_s: 5.0, register: 5, periods: 1 },
-        Signal::SteppedSine(SteppedSine { agreement: 0.05, ..SteppedSine::new(0.3, vec![0.1, 0.3]) }),
-        Signal::UltimateGain(UltimateGain::new(4.0, 0.4)),
-    ]
-}
-
-/// With its noise, the rig shows no oscillation under proportional control that its output could carry.
-fn finds_nothing(signal: &Signal, measurement: Measurement) -> bool {
-    matches!(signal, Signal::UltimateGain(_)) && measurement.noise
-}
-
-/// Everything of a loop that an operator sets.
-fn settings(active: &ActiveLoop) -> impl PartialEq + std::fmt::Debug + use<> {
-    let control = &active.control;
-    let law = (*control.law(), control.tuning(), control.options().clone(), control.pv_filter_s());
-    (active.spec.clone(), control.mode, control.setpoint_cm, law)
-}
-
-/// One sample, in which the output is finite and within its limits.
-fn step(closed: &mut ClosedLoop) {
-    closed.step();
-    let control = &closed.loops()[0].control;
-    let (mv, limits) = (control.mv(), control.limits());
-    assert!((limits.low..=limits.high).contains(&mv), "{mv} at {} s", closed.time_s());
-}
-
-fn to_its_end(closed: &mut ClosedLoop) -> ExcitationReport {
-    while !closed.has_ended_excitations() {
-        step(closed);
-    }
-    closed.ended_excitations().next().expect("ended")
-}
-
-/// The loop controls again, and holds its level.
-fn is_alive(closed: &mut ClosedLoop) {
-    closed.apply(&RigCommand::Mode { tag: tag(), mode: Mode::Automatic }).expect("possible");
-    for _ in 0..7500 {
-        step(closed);
-    }
-    let error_cm = closed.readings()[0].level_cm - closed.loops()[0].control.setpoint_cm;
-    assert!(error_cm.abs() < 0.5, "{error_cm}");
-}
-
-#[test]
-fn every_test_leaves_the_loop_as_it_was() {
-    for mode in [Mode::Automatic, Mode::Manual] {
-        for measurement in [Measurement::IDEAL, Measurement::DEFAULT] {
-            for signal in signals() {
-                let mut closed = closed(mode, measurement);
-                let (before, mv) = (settings(&closed.loops()[0]), closed.loops()[0].control.mv());
-                begin(&mut closed, &excite(signal.clone())).expect("begins");
-                let report = to_its_end(&mut closed);
-                if finds_nothing(&signal, measurement) {
-                    let reason = &report.ending;
-                    assert!(
-                        matches!(reason, Ending::Stopped(StopReason::NoOscillation { .. })),
-                        "{reason:?}"
-                    );
-                } else {
-                    assert_eq!(report.ending, Ending::Finished, "{mode:?} {signal:?}");
-                }
-                assert_eq!(settings(&closed.loops()[0]), before, "{signal:?}");
-                assert_eq!(closed.loops()[0].control.actual_mode(), mode, "{signal:?}");
-                if mode == Mode::Manual {
-                    assert_eq!(closed.loops()[0].control.mv(), mv, "{signal:?}");
-                }
-                is_alive(&mut closed);
-            }
-        }
-    }
-}
-
-/// In automatic without noise, the output after a test is the one before it, and no test makes it jump.
-#[test]
-fn the_end_of_a_test_is_no_bump() {
-    let mut closed = closed(Mode::Automatic, Measurement::IDEAL);
-    let before = closed.loops()[0].control.mv();
-    begin(&mut closed, &excite(Signal::Doublet { amplitude: 0.1, hold_s: 20.0 })).expect("begins");
-    to_its_end(&mut closed);
-    let mut last = closed.loops()[0].control.mv();
-    assert!((last - before).abs() < 0.01, "{last} after {before}");
-    for _ in 0..500 {
-        step(&mut closed);
-        let mv = closed.loops()[0].control.mv();
-        assert!((mv - last).abs() < 0.005, "{last} to {mv}");
-        last = mv;
-    }
-}
-
-/// A test under way, moved and with the level off its rest.
-fn under_way(mode: Mode) -> ClosedLoop {
-    let mut closed = closed(mode, Measurement::DEFAULT);
-    begin(&mut closed, &relay()).expect("begins");
-    for _ in 0..150 {
-        step(&mut closed);
-    }
-    assert!(closed.excitation().is_some_and(|now| now.tag == TAG && now.progress.phase != Phase::Listening));
-    closed
-}
-
-/// A name, what is done, and whether a reason is the one that follows.
-type End = (&'static str, fn(&mut ClosedLoop), fn(&StopReason) -> bool);
-
-#[test]
-fn whatever_ends_a_test_the_loop_is_as_it_was() {
-    for mode in [Mode::Automatic, Mode::Manual] {
-        let ends: [End; 4] = [
-            (
-                "abort",
-                |c| c.apply(&RigCommand::AbortExcitation { tag: tag() }).expect("possible"),
-                |r| *r == StopReason::Operator,
-            ),
-            (
-                "sensor",
-                |c| {
-                    let fault = Fault::BrokenWire;
-                    c.apply(&RigCommand::Fault { tag: "LT02".to_owned(), fault }).expect("possible");
-                },
-                |r| *r == StopReason::PvLost,
-            ),
-            (
-                "level",
-                |c| {
-                    let delta_cm = -13.8;
-                    c.apply(&RigCommand::Bump { tag: "TQ2".to_owned(), delta_cm }).expect("possible");
-                },
-                |r| matches!(r, StopReason::PvLimit { low: 1.5, .. }),
-            ),
-            ("defect", |c| c.stop_excitation(StopReason::Defect), |r| *r == StopReason::Defect),
-        ];
-        for (name, end, expected) in ends {
-            let mut closed = under_way(mode);
-            let before = settings(&closed.loops()[0]);
-            end(&mut closed);
-            let report = to_its_end(&mut closed);
-            let Ending::Stopped(reason) = &report.ending else { panic!("{name}: finished") };
-            assert!(expected(reason), "{name}: {reason}");
-            assert_eq!(settings(&closed.loops()[0]), before, "{name}");
-            step(&mut closed);
-            assert_eq!(closed.loops()[0].control.actual_mode(), mode, "{name}");
-            assert_eq!(closed.excitation(), None);
-            if name == "sensor" {
-                closed.apply(&RigCommand::Repair { tag: "LT02".to_owned(), kind: None }).expect("possible");
-            }
-            is_alive(&mut closed);
-        }
-    }
-}
-
-#[test]
-fn limits_and_time_of_the_description_end_it() {
-    let mut limited = excite(Signal::Step { size: 0.2, rest_share: 0.02, end: StepEnd::Stay });
-    limited.limits.pv_high = Some(15.4);
-    let mut running = closed(Mode::Automatic, Measurement::DEFAULT);
-    begin(&mut running, &limited).expect("begins");
-    let report = to_its_end(&mut running);
-    assert!(matches!(report.ending, Ending::Stopped(StopReason::PvLimit { high: 15.4, .. })));
-    is_alive(&mut running);
-    let short = Excitation { budget_s: 60.0, ..relay() };
-    let mut running = closed(Mode::Manual, Measurement::DEFAULT);
-    let mv = running.loops()[0].control.mv();
-    begin(&mut running, &short).expect("begins");
-    let report = to_its_end(&mut running);
-    assert_eq!(report.ending, Ending::Stopped(StopReason::Budget { budget_s: 60.0 }));
-    assert!((report.record.time_s.len() as f64 * 0.2 - 60.0).abs() < 1.0);
-    assert_eq!(running.loops()[0].control.mv(), mv);
-}
-
-/// The operator goes before a test: what he sends to the loop ends it, and is carried out.
-#[test]
-fn a_command_to_the_loop_ends_the_test_and_wins() {
-    let tuning = PidTuning::new(PidGains { kc: 1.0, ti_s: 100.0, td_s: 0.0, n: 10.0 });
-    let output = OutputLimits { high: Some(3.3), ..OutputLimits::default() };
-    let options = Box::new(LoopOptions { output, ..LoopOptions::default() });
-    let commands = [
-        (Mode::Automatic, RigCommand::Mode { tag: tag(), mode: Mode::Manual }),
-        (Mode::Automatic, RigCommand::Setpoint { tag: tag(), level_cm: 12.0 }),
-        (Mode::Manual, RigCommand::Mv { tag: tag(), value: 2.7 }),
-        (Mode::Manual, RigCommand::Mv { tag: "BA01".to_owned(), value: 2.7 }),
-        (Mode::Automatic, RigCommand::Tuning { tag: tag(), tuning }),
-        (Mode::Automatic, RigCommand::Law { tag: tag(), law: Law::PID_2GL }),
-        (Mode::Automatic, RigCommand::Options { tag: tag(), options }),
-        (Mode::Automatic, RigCommand::PvFilter { tag: tag(), time_constant_s: 2.0 }),
-    ];
-    for (mode, command) in commands {
-        let mut running = under_way(mode);
-        let at_rest = running.loops()[0].control.setpoint_cm;
-        running.apply(&command).expect("possible");
-        let report = running.ended_excitations().next().expect("ended");
-        let key = command.key();
-        assert_eq!(report.ending, Ending::Stopped(StopReason::Overruled { command: key }));
-        let mut plain = closed(mode, Measurement::DEFAULT);
-        plain.apply(&command).expect("possible");
-        assert_eq!(settings(&running.loops()[0]), settings(&plain.loops()[0]), "{command:?}");
-        step(&mut running);
-        match command {
-            RigCommand::Mv { value, .. } => assert_eq!(running.loops()[0].control.mv(), value),
-            RigCommand::Setpoint { level_cm, .. } => {
-                assert_eq!(running.loops()[0].control.setpoint_cm, level_cm);
-            }
-            _ => assert_eq!(running.loops()[0].control.setpoint_cm, at_rest),
-        }
-    }
-}
-
-#[test]
-fn a_refused_command_and_one_to_another_part_leave_the_test_alone() {
-    let mut running = under_way(Mode::Automatic);
-    for refused in [
-        RigCommand::Mv { tag: tag(), value: 2.0 },
-        RigCommand::Setpoint { tag: tag(), level_cm: 99.0 },
-        RigCommand::Configuration { id: "nowhere".to_owned() },
-        RigCommand::SteadyAt { tag: tag(), level_cm: 26.9 },
-    ] {
-        assert!(running.apply(&refused).is_err(), "{refused:?}");
-    }
-    let error = begin(&mut running, &relay());
-    assert!(matches!(error, Err(CommandError::Excitation(ExcitationError::Busy { .. }))), "{error:?}");
-    running.apply(&RigCommand::Valve { tag: "FV03".to_owned(), angle_deg: 89.0 }).expect("possible");
-    assert!(running.excitation().is_some());
-    let report = to_its_end(&mut running);
-    assert_eq!(report.ending, Ending::Finished);
-    let rows = &report.record.time_s;
-    assert!(rows.windows(2).all(|w| (w[1] - w[0] - 0.2).abs() < 1e-9), "no sample is missing");
-    let none = running.apply(&RigCommand::AbortExcitation { tag: tag() });
-    assert!(matches!(none, Err(CommandError::Excitation(ExcitationError::NotRunning { .. }))), "{none:?}");
-}
-
-#[test]
-fn another_configuration_and_another_state_end_it() {
-    let mut running = under_way(Mode::Automatic);
-    running.apply(&RigCommand::Configuration { id: "decoupled".to_owned() }).expect("possible");
-    let report = running.ended_excitations().next().expect("ended");
-    assert_eq!(report.ending, Ending::Stopped(StopReason::Configuration));
-    for _ in 0..100 {
-        step(&mut running);
-    }
-    assert_eq!(running.loops()[0].control.actual_mode(), Mode::Automatic);
-    let mut running = under_way(Mode::Automatic);
-    running.apply(&RigCommand::SteadyAt { tag: tag(), level_cm: 14.0 }).expect("possible");
-    let report = running.ended_excitations().next().expect("ended");
-    assert_eq!(report.ending, Ending::Stopped(StopReason::Restarted));
-    is_alive(&mut running);
-}
-
 #[test]
 fn preconditions_are_refused_in_words() {
-    let mut running = closed(Mode::Automatic, Measurement::DEFAULT);
+    let mut running = tested_rig(Mode::Automatic, Measurement::DEFAULT);
     let error = begin(&mut running, &excite(Signal::Relay(Relay::new(2.0)))).expect_err("no room");
     assert!(matches!(error, CommandError::Excitation(ExcitationError::Margin { .. })), "{error}");
-    let mut off = relay();
+    let mut off = relay_test();
     off.limits.pv_low = Some(16.0);
     let error = begin(&mut running, &off).expect_err("outside");
     assert!(matches!(error, CommandError::Excitation(ExcitationError::PvOutside { .. })), "{error}");
-    let nowhere = RigCommand::Excite { tag: "LIC-09".to_owned(), excitation: Box::new(relay()) };
+    let nowhere = RigCommand::Excite { tag: "LIC-09".to_owned(), excitation: Box::new(relay_test()) };
     assert!(matches!(running.apply(&nowhere), Err(CommandError::UnknownTag { .. })));
     running.apply(&RigCommand::Fault { tag: "LT02".to_owned(), fault: Fault::BrokenWire }).expect("possible");
-    step(&mut running);
-    let error = begin(&mut running, &relay()).expect_err("no PV");
+    checked_step(&mut running);
+    let error = begin(&mut running, &relay_test()).expect_err("no PV");
     assert!(matches!(error, CommandError::Excitation(ExcitationError::NoPv { .. })), "{error}");
-    let mut moving = closed(Mode::Automatic, Measurement::DEFAULT);
+    let mut moving = tested_rig(Mode::Automatic, Measurement::DEFAULT);
     moving.apply(&RigCommand::Setpoint { tag: tag(), level_cm: 18.0 }).expect("possible");
-    begin(&mut moving, &Excitation { at_rest: AtRest::Required, ..relay() }).expect("begins to listen");
+    begin(&mut moving, &Excitation { at_rest: AtRest::Required, ..relay_test() }).expect("begins to listen");
     let report = to_its_end(&mut moving);
     assert!(matches!(report.ending, Ending::Stopped(StopReason::NotAtRest { .. })), "{:?}", report.ending);
 }
@@ -509,7 +231,7 @@ fn a_session_tells_how_a_test_goes_on_and_what_came_of_it() {
     let session = Session::start(&rig(Measurement::DEFAULT), Box::new(|| ())).expect("starts");
     assert!(session.send(SessionCommand::Speed(1000.0)) && session.send(SessionCommand::Run));
     wait("samples", || session.snapshot().time_s > 5.0);
-    let excite = || RigCommand::Excite { tag: tag(), excitation: Box::new(relay()) };
+    let excite = || RigCommand::Excite { tag: tag(), excitation: Box::new(relay_test()) };
     assert!(session.send(SessionCommand::Rig(excite())));
     wait("the test in the snapshot", || session.snapshot().excitation.is_some());
     let mut kinds = vec![];
@@ -570,4 +292,14 @@ fn a_scenario_file_runs_a_test_and_its_csv_shows_it() {
         let error = load_scenario(&path).expect_err("refused").to_string();
         assert!(error.contains("line 7"), "{error}");
     }
+}
+
+#[test]
+fn an_output_by_hand_reaches_an_actuator_that_adds_up() {
+    let law = Law::PidI2gl { clip: Clip::Output, sends: Sends::Increment };
+    let mut manual = tested_rig(Mode::Manual, Measurement::IDEAL);
+    manual.apply(&RigCommand::Law { tag: tag(), law }).expect("possible");
+    manual.apply(&RigCommand::Mv { tag: tag(), value: 2.7 }).expect("possible");
+    checked_step(&mut manual);
+    assert_eq!(manual.loops()[0].control.mv(), 2.7);
 }

@@ -3,14 +3,12 @@
 //! A test binary of its own, since the counting allocator serves the whole program.
 
 use vasos_engine::control::{Action, Clip, Law, LoopOptions, Sends};
-use vasos_engine::excitation::{
-    AtRest, Ending, Excitation, Relay, Signal, StepEnd, SteppedSine, StopReason, UltimateGain,
-};
+use vasos_engine::excitation::{AtRest, Ending, Excitation, StopReason};
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::RigCommand;
 use vasos_engine::sim::ClosedLoop;
 use vasos_io::rig::{PRESETS, parse_rig, preset};
-use vasos_tests::root;
+use vasos_tests::{root, signals};
 
 #[test]
 fn a_sample_allocates_nothing() {
@@ -64,15 +62,7 @@ fn a_sample_of_any_law_with_every_option_allocates_nothing() {
 /// Every test on a loop, from its first sample to its last: what it needs, it reserves when it is asked for.
 #[test]
 fn a_sample_of_any_test_on_a_loop_allocates_nothing() {
-    for signal in [
-        Signal::Step { size: 0.1, rest_share: 0.05, end: StepEnd::Back },
-        Signal::SetpointStep { size: 1.0, rest_share: 0.05, end: StepEnd::Back },
-        Signal::Relay(Relay::new(0.3)),
-        Signal::Doublet { amplitude: 0.2, hold_s: 60.0 },
-        Signal::Prbs { amplitude: 0.2, clock_s: 5.0, register: 5, periods: 1 },
-        Signal::SteppedSine(SteppedSine { agreement: 0.05, ..SteppedSine::new(0.3, vec![0.1, 0.3]) }),
-        Signal::UltimateGain(UltimateGain::new(4.0, 0.4)),
-    ] {
+    for signal in signals() {
         let network = preset("stad").expect("preset");
         let mut closed = ClosedLoop::simulated(network, 0, Measurement::DEFAULT, 1).expect("starts");
         for _ in 0..1000 {

@@ -49,6 +49,8 @@ pub struct ActiveLoop {
     pub control: ControlLoop,
     /// The last output was held because the input was not a number.
     pub held: bool,
+    /// Output that it was put to since the last sample, by hand or at the end of an experiment.
+    pub(super) put: Option<f64>,
     /// What an experiment has it do.
     pub(super) forced: Option<Forced>,
     disturbance: Option<Disturbance>,
@@ -81,6 +83,7 @@ impl ActiveLoop {
             outer: outer_of(specs, &spec.id),
             control: ControlLoop::new(&spec, sample_time_s, range, mv),
             held: false,
+            put: None,
             forced: None,
             disturbance: None,
             target,
@@ -89,6 +92,12 @@ impl ActiveLoop {
         };
         active.find_disturbance(network);
         Some(active)
+    }
+
+    /// Puts the output to a value from which the next sample goes on.
+    pub(super) fn put_to(&mut self, mv: f64) {
+        self.control.set_mv(mv);
+        self.put = Some(self.control.mv());
     }
 
     /// Looks up where the feed-forward takes its disturbance from, after a change of the options.
@@ -122,6 +131,7 @@ impl ActiveLoop {
 /// Lets the loop `index` take a sample. An outer loop whose inner loop is not in cascade follows its setpoint;
 /// an inner loop in cascade takes the outer's output, unless an experiment has it do something else. `inputs` are the pumps' inputs as last written.
 pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading], inputs: &[f64]) {
+    let put = loops[index].put.take();
     let mut follows = None;
     let mut blocked: Option<Bound> = None;
     match loops[index].target {
@@ -131,7 +141,7 @@ pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading
         LoopTarget::Loop(inner) => blocked = blocked_by(loops, inner),
         LoopTarget::Pump(pump) => {
             if loops[index].control.sends_increments() {
-                follows = Some(inputs[pump]);
+                follows = Some(put.unwrap_or(inputs[pump]));
             }
         }
     }

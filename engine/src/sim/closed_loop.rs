@@ -362,7 +362,7 @@ impl ClosedLoop {
                 let inner = self.loops[inner].spec.id.clone();
                 return Err(CommandError::Follows { tag: tag.to_owned(), inner });
             }
-            self.loops[index].control.set_mv(value);
+            self.loops[index].put_to(value);
             return Ok(());
         }
         let Some(LoopTarget::Pump(pump)) = pump else {

@@ -171,7 +171,7 @@ impl ClosedLoop {
         let Some(active) = self.loops.get_mut(index) else { return };
         active.forced = None;
         if let Some(mv) = restore.output {
-            active.control.set_mv(mv);
+            active.put_to(mv);
         }
         if let Some(setpoint_cm) = restore.setpoint {
             active.control.setpoint_cm = setpoint_cm;
