@@ -110,3 +110,26 @@ fn what_cannot_be_is_refused_in_words() {
         assert!(error.contains(said), "{arguments:?}: {error}");
     }
 }
+
+#[test]
+fn a_scenario_says_how_its_tests_ended() {
+    let path = scratch("excite_scenario.toml");
+    let test =
+        "excite = { tag = \"LIC-02\", excitation = { signal = { step = { size = 0.1 } }, budget_s = 60.0 } }";
+    let scenario = "schema = 1\nrig = \"stad\"\nduration_s = 90.0\n[[event]]\nat_s = 5.0\n";
+    std::fs::write(&path, format!("{scenario}{test}\n")).expect("written");
+    let simulate = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_vasos"));
+        let output = command.arg("simulate").arg(&path).args(more).output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let text = simulate(&[]);
+    assert!(text.contains("LIC-02: step test ended after 60 s"), "{text}");
+    let whole: Value = serde_json::from_str(&simulate(&["--json"])).expect("JSON");
+    let test = &whole["tests"][0];
+    assert_eq!(
+        (&test["signal"], &test["finished"], &test["from_s"]),
+        (&"step".into(), &false.into(), &5.0.into())
+    );
+}

@@ -290,13 +290,18 @@ fn as_json(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Valu
     })
 }
 
-fn as_text(arguments: &Arguments, report: &ExcitationReport, told: Told) -> String {
+/// Which test it was, and how it ended.
+pub(super) fn headline(report: &ExcitationReport) -> String {
+    let name = report.excitation.signal.key().replace('_', " ");
     let span_s = report.record.time_s.last().map(|last| last - report.start_s);
-    let mut text = format!("{}: {} test", report.tag, report.excitation.signal.key().replace('_', " "));
     match &report.ending {
-        Ending::Finished => text.push_str(&format!(" finished after {} s", shown(span_s))),
-        Ending::Stopped(reason) => text.push_str(&format!(" {reason}")),
+        Ending::Finished => format!("{}: {name} test finished after {} s", report.tag, shown(span_s)),
+        Ending::Stopped(reason) => format!("{}: {name} test {reason}", report.tag),
     }
+}
+
+fn as_text(arguments: &Arguments, report: &ExcitationReport, told: Told) -> String {
+    let mut text = headline(report);
     if let Some(path) = &arguments.output {
         text.push_str(&format!(", written to {}", path.display()));
     }

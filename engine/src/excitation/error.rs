@@ -1,4 +1,4 @@
-//! Why an experiment does not begin.
+//! Why a test does not begin.
 
 use crate::explain::{Explain, number};
 use crate::plant::RigError;
@@ -9,10 +9,10 @@ pub enum ExcitationError {
     /// A value of the description.
     #[error(transparent)]
     Value(#[from] RigError),
-    /// Another experiment runs.
+    /// Another test runs.
     #[error("a test runs on {tag}; end that one first")]
     Busy {
-        /// Loop of the experiment that runs.
+        /// Loop of the test that runs.
         tag: String,
     },
     /// None to end.

@@ -1,4 +1,4 @@
-//! Experiments that move a running loop so that a model can be told from what it answers.
+//! Tests that move a running loop so that a model can be told from what it answers.
 //!
 //! An [`Excitation`] describes one: its signal (step, setpoint step, relay, doublet, PRBS, stepped sine, ultimate gain),
 //! the limits it keeps and the time it may take. An [`ExcitationRun`] carries it out sample by sample: it listens to

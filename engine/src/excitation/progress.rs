@@ -1,8 +1,8 @@
-//! What goes between an experiment and the loop it is on: where it begins, what it asks for, how far it is.
+//! What goes between a test and the loop it is on: where it begins, what it asks for, how far it is.
 
 use crate::control::{Limits, Mode};
 
-/// The loop at the moment an experiment is asked for.
+/// The loop at the moment a test is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circumstances {
     /// Its tag.
@@ -25,7 +25,7 @@ pub struct Circumstances {
     pub mode: Mode,
 }
 
-/// What an experiment keeps to.
+/// What a test keeps to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Envelope {
     /// Limits of the PV in PV units.
@@ -45,7 +45,7 @@ pub enum Drive {
     Setpoint(f64),
 }
 
-/// What an experiment that has ended leaves to be put back; the rest of the loop it never touched.
+/// What a test that has ended leaves to be put back; the rest of the loop it never touched.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Restore {
     /// Output to go on from, in MV units.
@@ -54,7 +54,7 @@ pub struct Restore {
     pub setpoint: Option<f64>,
 }
 
-/// What an experiment is doing.
+/// What a test is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Phase {
     /// It measures noise and values at rest; nothing is moved.
@@ -92,7 +92,7 @@ impl Phase {
     }
 }
 
-/// How far an experiment is.
+/// How far a test is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// What it is doing.

@@ -1,4 +1,4 @@
-//! What came of an experiment: the record, what was measured in it, and the model it tells.
+//! What came of a test: the record, what was measured in it, and the model it tells.
 
 use num_complex::Complex64;
 
@@ -13,7 +13,7 @@ use crate::tune::{Ultimate, ultimate};
 /// ε/a above which the seed's estimates are far from the ultimate point: at 0.3 the ultimate gain is 40 % low.
 const WIDE_HYSTERESIS: f64 = 0.3;
 
-/// Columns of an experiment, one entry a sample. A row's setpoint and MV apply from its time until the next; its PV was
+/// Columns of a test, one entry a sample. A row's setpoint and MV apply from its time until the next; its PV was
 /// measured just before.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Record {
@@ -44,7 +44,7 @@ impl Record {
     }
 }
 
-/// How an experiment ended.
+/// How a test ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ending {
     /// All was measured.
@@ -135,7 +135,7 @@ pub enum Finding {
     Ultimate(UltimateFinding),
 }
 
-/// A finished or stopped experiment.
+/// A finished or stopped test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExcitationReport {
     /// Tag of its loop.
@@ -257,7 +257,7 @@ pub struct Identified {
     pub warnings: Vec<ExcitationWarning>,
 }
 
-/// Fits a first-order model with dead time to the record of an experiment by output error.
+/// Fits a first-order model with dead time to the record of a test by output error.
 ///
 /// # Errors
 /// [`FitError`] of the record.

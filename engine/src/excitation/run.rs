@@ -1,4 +1,4 @@
-//! An experiment under way: it listens, moves, watches the limits and the time, and keeps the record.
+//! A test under way: it listens, moves, watches the limits and the time, and keeps the record.
 
 use super::error::ExcitationError;
 use super::listening::{Base, Listening};
@@ -21,7 +21,7 @@ enum Stage {
     Over(State),
 }
 
-/// An experiment under way. Step it once a sample, before the loop, and tell it afterwards what was written.
+/// A test under way. Step it once a sample, before the loop, and tell it afterwards what was written.
 #[derive(Debug, Clone)]
 pub struct ExcitationRun {
     excitation: Excitation,

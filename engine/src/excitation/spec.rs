@@ -1,8 +1,8 @@
-//! What an experiment is: plain data, as files and commands give it.
+//! What a test is: plain data, as files and commands give it.
 
 use serde::{Deserialize, Serialize};
 
-/// An experiment on a loop: its signal, and what it must keep to.
+/// A test on a loop: its signal, and what it must keep to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
@@ -23,7 +23,7 @@ pub struct Excitation {
 }
 
 impl Excitation {
-    /// An experiment with defaults around its signal.
+    /// A test with defaults around its signal.
     #[must_use]
     pub fn new(signal: Signal) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Excitation {
     }
 }
 
-/// Values that an experiment must not leave; what is left out is that of the loop and its sensor.
+/// Values that a test must not leave; what is left out is that of the loop and its sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExcitationLimits {
@@ -62,7 +62,7 @@ pub struct ExcitationLimits {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AtRest {
-    /// A PV that drifts while it is listened to ends the experiment before anything was moved.
+    /// A PV that drifts while it is listened to ends the test before anything was moved.
     #[default]
     Required,
     /// It begins wherever the loop is.
@@ -266,7 +266,7 @@ impl UltimateGain {
         0.03
     }
 
-    /// A test with defaults around its gain and kick.
+    /// A search with defaults around its gain and kick.
     #[must_use]
     pub fn new(start_gain: f64, kick: f64) -> Self {
         Self {

@@ -1,9 +1,9 @@
-//! Why an experiment ended before it was finished.
+//! Why a test ended before it was finished.
 
 use super::error::ExcitationError;
 use crate::explain::{Explain, number};
 
-/// What ended an experiment early. The loop is as it was before.
+/// What ended a test early. The loop is as it was before.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StopReason {
     /// The operator asked for it.

@@ -1,4 +1,4 @@
-//! The machines on exact first-order plants, and every way an experiment can end.
+//! The machines on exact first-order plants, and every way a test can end.
 
 use num_complex::Complex64;
 use rand::SeedableRng;
@@ -73,7 +73,7 @@ fn fopdt(gain: f64, time_constant_s: f64, dead_time_s: f64) -> Fopdt {
     Fopdt::new(gain, time_constant_s, dead_time_s).expect("a model")
 }
 
-/// Runs an experiment on a process in manual until it ends.
+/// Runs a test on a process in manual until it ends.
 fn run(process: &mut Process, excitation: &Excitation) -> ExcitationReport {
     let mut run = ExcitationRun::start(excitation, circumstances(process.h)).expect("begins");
     let mut mv = MV_AT_REST;
@@ -94,7 +94,7 @@ fn run(process: &mut Process, excitation: &Excitation) -> ExcitationReport {
         }
         process.hold(mv);
     }
-    unreachable!("an experiment ends")
+    unreachable!("a test ends")
 }
 
 fn excitation(signal: Signal) -> Excitation {

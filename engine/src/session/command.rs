@@ -98,14 +98,14 @@ pub enum RigCommand {
         /// Seed.
         seed: u64,
     },
-    /// Begins an experiment on a loop, which moves it over its mode and its law until it ends.
+    /// Begins a test on a loop, which moves it over its mode and its law until it ends.
     Excite {
         /// Loop.
         tag: String,
         /// What is done, within which limits.
         excitation: Box<Excitation>,
     },
-    /// Ends the experiment on a loop.
+    /// Ends the test on a loop.
     AbortExcitation {
         /// Loop.
         tag: String,
@@ -185,7 +185,7 @@ pub enum CommandError {
     /// The gains are not usable.
     #[error(transparent)]
     Gains(#[from] GainsError),
-    /// The experiment cannot begin, or there is none to end.
+    /// The test cannot begin, or there is none to end.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
     /// No such loop, pump, valve, tank or configuration now.

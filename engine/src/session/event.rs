@@ -100,14 +100,14 @@ pub enum EventKind {
     Refused(CommandError),
     /// An alarm began (`true`) or ended.
     Alarm(Alarm, bool),
-    /// An experiment on a loop came to another phase or cycle; at most one in a few seconds of the run within a phase.
+    /// A test on a loop came to another phase or cycle; at most one in a few seconds of the run within a phase.
     ExcitationProgress {
         /// Loop.
         tag: String,
         /// How far it is.
         progress: Progress,
     },
-    /// An experiment on a loop ended, with what came of it; the loop is as it was before.
+    /// A test on a loop ended, with what came of it; the loop is as it was before.
     ExcitationEnded(Arc<ExcitationReport>),
     /// Samples nobody fetched were given up.
     SamplesLost {

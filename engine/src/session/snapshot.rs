@@ -124,7 +124,7 @@ pub struct Snapshot {
     pub alarms: Vec<Alarm>,
     /// Faults that have been switched on.
     pub faults: Vec<ActiveFault>,
-    /// The experiment that runs on a loop.
+    /// The test that runs on a loop.
     pub excitation: Option<ExcitationNow>,
 }
 

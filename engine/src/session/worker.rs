@@ -24,7 +24,7 @@ const TICK: Duration = Duration::from_millis(10);
 const BUDGET: Duration = Duration::from_millis(12);
 /// Samples kept for a reader that does not fetch them: an hour and a half at 200 ms and 20 ×.
 const MOST_PENDING: usize = 500_000;
-/// Seconds of the run between two words on the cycles of an experiment.
+/// Seconds of the run between two words on the cycles of a test.
 const BETWEEN_CYCLES_S: f64 = 5.0;
 /// Events kept likewise.
 const MOST_EVENTS: usize = 10_000;
@@ -38,7 +38,7 @@ pub(super) struct Worker {
     achieved_speed: f64,
     baseline_cm3: f64,
     alarms: AlarmTable,
-    /// Progress of the experiment as it was last told.
+    /// Progress of the test as it was last told.
     told: Option<Progress>,
     fresh: SampleBlock,
     pending: SampleBlock,
@@ -176,7 +176,7 @@ impl Worker {
         true
     }
 
-    /// Says how the experiment goes on: every phase, cycles at intervals, and its end.
+    /// Says how the test goes on: every phase, cycles at intervals, and its end.
     fn tell_excitation(&mut self) {
         if self.closed.has_ended_excitations() {
             let reports: Vec<_> = self.closed.ended_excitations().collect();

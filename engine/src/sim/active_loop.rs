@@ -21,7 +21,7 @@ enum Disturbance {
     Pump(usize),
 }
 
-/// What an experiment has a loop do, over its mode and its law, which stay as they are.
+/// What a test has a loop do, over its mode and its law, which stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Forced {
     /// Give this output, in MV units.
@@ -49,9 +49,9 @@ pub struct ActiveLoop {
     pub control: ControlLoop,
     /// The last output was held because the input was not a number.
     pub held: bool,
-    /// Output that it was put to since the last sample, by hand or at the end of an experiment.
+    /// Output that it was put to since the last sample, by hand or at the end of a test.
     pub(super) put: Option<f64>,
-    /// What an experiment has it do.
+    /// What a test has it do.
     pub(super) forced: Option<Forced>,
     disturbance: Option<Disturbance>,
 }
@@ -129,7 +129,8 @@ impl ActiveLoop {
 }
 
 /// Lets the loop `index` take a sample. An outer loop whose inner loop is not in cascade follows its setpoint;
-/// an inner loop in cascade takes the outer's output, unless an experiment has it do something else. `inputs` are the pumps' inputs as last written.
+/// an inner loop in cascade takes the outer's output, unless a test has it do something else. `inputs` are the pumps'
+/// inputs as last written.
 pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading], inputs: &[f64]) {
     let put = loops[index].put.take();
     let mut follows = None;

@@ -1,11 +1,11 @@
-//! Experiments on a running loop: they go over it and leave it as it was.
+//! Tests on a running loop: they go over it and leave it as it was.
 //!
 //! While one runs, mode, setpoint, law, tuning and options of the loop stay what the operator chose; a [`Forced`] value
-//! goes before them sample by sample, and the law follows as in manual. To end an experiment is to take that value away,
+//! goes before them sample by sample, and the law follows as in manual. To end a test is to take that value away,
 //! and to put the output (or the setpoint) back where it was: there is nothing else to restore.
 //!
-//! The operator goes before an experiment. A command to its loop that is possible ends it first and is carried out
-//! then, whichever it is; one that is refused changes nothing, and the experiment goes on.
+//! The operator goes before a test. A command to its loop that is possible ends it first and is carried out
+//! then, whichever it is; one that is refused changes nothing, and the test goes on.
 
 use super::active_loop::{Forced, LoopTarget};
 use super::closed_loop::ClosedLoop;
@@ -17,13 +17,13 @@ use crate::excitation::{
 use crate::plant::ReadingStatus;
 use crate::session::{CommandError, RigCommand};
 
-/// The experiment that runs, with its loop's index.
+/// The test that runs, with its loop's index.
 pub(super) struct Excited {
     pub index: usize,
     pub run: ExcitationRun,
 }
 
-/// The experiment that runs, as a view needs it.
+/// The test that runs, as a view needs it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExcitationNow {
     /// Tag of its loop.
@@ -37,13 +37,13 @@ pub struct ExcitationNow {
 }
 
 impl ClosedLoop {
-    /// How far the experiment that runs is.
+    /// How far the test that runs is.
     #[must_use]
     pub fn excitation_progress(&self) -> Option<Progress> {
         self.excited.as_ref().map(|e| e.run.progress())
     }
 
-    /// The experiment that runs.
+    /// The test that runs.
     #[must_use]
     pub fn excitation(&self) -> Option<ExcitationNow> {
         let run = &self.excited.as_ref()?.run;
@@ -55,7 +55,7 @@ impl ClosedLoop {
         })
     }
 
-    /// Experiments that ended since the last call, in that order.
+    /// Tests that ended since the last call, in that order.
     pub fn ended_excitations(&mut self) -> impl Iterator<Item = ExcitationReport> + '_ {
         self.ended.drain(..).map(|e| e.run.into_report())
     }
@@ -111,7 +111,7 @@ impl ClosedLoop {
         Ok(())
     }
 
-    /// Ends the experiment that runs, if one does, and puts its loop back.
+    /// Ends the test that runs, if one does, and puts its loop back.
     pub fn stop_excitation(&mut self, reason: StopReason) {
         if let Some(excited) = &mut self.excited {
             excited.run.stop(reason);
@@ -119,7 +119,7 @@ impl ClosedLoop {
         }
     }
 
-    /// Before the loops take a sample: what the experiment has its loop do.
+    /// Before the loops take a sample: what the test has its loop do.
     pub(super) fn excite_sample(&mut self) {
         let time_s = self.time_s();
         let Some(Excited { index, run }) = &mut self.excited else { return };
@@ -159,14 +159,14 @@ impl ClosedLoop {
         }
     }
 
-    /// Takes an ended experiment off its loop and puts back what it moved.
+    /// Takes an ended test off its loop and puts back what it moved.
     fn put_back(&mut self) {
         let Some(excited) = self.excited.take() else { return };
         self.release(excited.index, excited.run.restore());
         self.ended.push(excited);
     }
 
-    /// Lets a loop do again what its mode and its law say, from the values before the experiment.
+    /// Lets a loop do again what its mode and its law say, from the values before the test.
     fn release(&mut self, index: usize, restore: Restore) {
         let Some(active) = self.loops.get_mut(index) else { return };
         active.forced = None;
@@ -188,7 +188,7 @@ impl ClosedLoop {
         }
     }
 
-    /// Why a command ends the experiment that runs; `None` for one that has nothing to do with it.
+    /// Why a command ends the test that runs; `None` for one that has nothing to do with it.
     pub(super) fn overrules(&self, command: &RigCommand) -> Option<StopReason> {
         let excited = self.excited.as_ref()?;
         let active = &self.loops[excited.index];
@@ -220,7 +220,7 @@ impl ClosedLoop {
         }
     }
 
-    /// Carries out a command to a loop whose experiment it ends; when it is refused, the experiment goes on.
+    /// Carries out a command to a loop whose test it ends; when it is refused, the test goes on.
     pub(super) fn apply_overruling(
         &mut self,
         command: &RigCommand,

@@ -74,7 +74,7 @@ pub struct Run {
     pub values: Vec<f64>,
     /// Steps of the integrator.
     pub integrator_steps: u64,
-    /// Experiments on its loops, in the order in which they ended.
+    /// Tests on its loops, in the order in which they ended.
     pub excitations: Vec<ExcitationReport>,
 }
 
@@ -248,11 +248,11 @@ pub fn run_scenario_while(
     Ok(Some(run.finish(&mut closed)))
 }
 
-/// Runs an experiment on a loop of a simulated rig until it ends: from the state of the rig's file in a configuration, or
+/// Runs a test on a loop of a simulated rig until it ends: from the state of the rig's file in a configuration, or
 /// with the rig at rest with the loop's level at `level_cm`.
 ///
 /// # Errors
-/// [`CommandError`] when the rig cannot start there, or the experiment is refused.
+/// [`CommandError`] when the rig cannot start there, or the test is refused.
 pub fn run_excitation(
     rig: &Rig,
     tag: &str,
