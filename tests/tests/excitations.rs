@@ -40,6 +40,7 @@ fn preconditions_are_refused_in_words() {
     begin(&mut moving, &Excitation { at_rest: AtRest::Required, ..relay_test() }).expect("begins to listen");
     let report = to_its_end(&mut moving);
     assert!(matches!(report.ending, Ending::Stopped(StopReason::NotAtRest { .. })), "{:?}", report.ending);
+    assert_eq!(report.moved_at_s, None);
 }
 
 /// On the noisy rig the relay's own estimate is far from the ultimate gain, and that of the fitted model is not.

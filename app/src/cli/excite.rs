@@ -25,7 +25,7 @@ Examples:
   vasos excite stad --loop LIC-02 --level 19 --relay 0.3 --down 0.2 --hysteresis 0.1 -o relay.csv
   vasos excite stad --loop LIC-02 --step 0.1 --pv-high 17 --budget 1800 --json
   vasos excite stad --loop LIC-02 --prbs 0.2 --clock 5 --register 6
-  vasos excite stad --loop LIC-02 --ultimate-gain 4 --kick 0.4
+  vasos excite stad --loop LIC-02 --ultimate-gain 4 --kick 0.2 --ideal
   vasos excite stad --loop LIC-02 --sine 0.3 --frequencies 0.05,0.1,0.2
 The loop is listened to first; then it is moved, within its limits, until all is measured. A CSV has the whole run.
 With a hysteresis 4d/(πa) is not the ultimate gain: that of the fitted model is.
@@ -157,7 +157,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     if let Some(path) = &arguments.output {
         write_run_csv(&run, path).map_err(Refusal::of)?;
     }
-    let told = report.pv_at_rest.map(|_| identify_report(&report));
+    let told = report.moved_at_s.map(|_| identify_report(&report));
     let status = u8::from(report.ending != Ending::Finished);
     let text = if arguments.json {
         json::text(&as_json(arguments, &report, told.as_ref()))

@@ -146,6 +146,8 @@ pub struct ExcitationReport {
     pub envelope: Envelope,
     /// When it was asked for, in seconds of the run.
     pub start_s: f64,
+    /// When it moved the loop first, in seconds of the run; absent when it ended before.
+    pub moved_at_s: Option<f64>,
     /// How it ended.
     pub ending: Ending,
     /// Mean PV before the first move, in PV units; absent when it ended before.

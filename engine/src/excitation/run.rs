@@ -35,7 +35,7 @@ pub struct ExcitationRun {
     waiting: Option<(f64, f64)>,
     ending: Option<Ending>,
     finding: Finding,
-    moved: bool,
+    moved_at_s: Option<f64>,
     /// Made at the start, so that the last sample of listening allocates nothing.
     prepared: Option<Box<Machine>>,
 }
@@ -75,7 +75,7 @@ impl ExcitationRun {
             waiting: None,
             ending: None,
             finding: Finding::Nothing,
-            moved: false,
+            moved_at_s: None,
         })
     }
 
@@ -139,7 +139,7 @@ impl ExcitationRun {
         let heard = Heard { t_s: time_s - *since_s, y: pv - base.pv, u: mv - base.mv };
         match machine.step(heard) {
             Order::Move(by) => {
-                self.moved = true;
+                self.moved_at_s.get_or_insert(time_s);
                 match self.excitation.signal {
                     Signal::SetpointStep { .. } => Drive::Setpoint(self.setpoint_at_rest() + by),
                     _ => Drive::Output(self.envelope.mv.clamp(base.mv + by)),
@@ -206,7 +206,7 @@ impl ExcitationRun {
     /// What has to be put back now that it has ended.
     #[must_use]
     pub fn restore(&self) -> Restore {
-        let Some(base) = self.base.filter(|_| self.moved) else { return Restore::default() };
+        let Some(base) = self.base.filter(|_| self.moved_at_s.is_some()) else { return Restore::default() };
         let manual = self.start.mode == Mode::Manual;
         let before = if manual { self.start.mv } else { base.mv };
         let finished = self.ending == Some(Ending::Finished);
@@ -253,6 +253,7 @@ impl ExcitationRun {
             excitation: self.excitation,
             envelope: self.envelope,
             start_s: self.start.time_s,
+            moved_at_s: self.moved_at_s,
             ending: self.ending.unwrap_or(Ending::Stopped(StopReason::Operator)),
             pv_at_rest: base.map(|b| b.pv),
             mv_at_rest: base.map(|b| b.mv),
