@@ -1,6 +1,6 @@
 //! What a loop tells before it is moved: noise, values at rest, drift.
 
-/// Order of the moving average, Campos et al., CBA 2014 (the seed of the hysteresis).
+/// Order of the moving average, Silva, Bispo, Teixeira & Brandão, CBA 2014.
 const ORDER: usize = 4;
 /// sd(δ)/σ for white noise: δ = y − ȳ has the weights 3/4 and three times −1/4.
 const WHITE: f64 = 0.866_025_403_784_438_6;

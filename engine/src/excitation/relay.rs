@@ -4,7 +4,7 @@
 //! y counted from the PV at rest. A cycle lasts from one switch up to the next. Cycles agree when their periods and
 //! amplitudes do, beyond what sampling and noise leave open; when the last ones all agree, they are averaged.
 //!
-//! Source: Åström & Hägglund, Automatica 20 (1984) 645; hysteresis from the noise: Campos et al., CBA 2014.
+//! Source: Åström & Hägglund, Automatica 20 (1984) 645; hysteresis from the noise: Silva et al., CBA 2014.
 
 use super::progress::Phase;
 use super::report::{Finding, RelayFinding};

@@ -10,7 +10,7 @@ use crate::identify::{FitError, FitProblem, FopdtFit, fit_fopdt};
 use crate::model::ProcessModel;
 use crate::tune::{Ultimate, ultimate};
 
-/// ε/a above which the seed's estimates are far from the ultimate point: at 0.3 the ultimate gain is 40 % low.
+/// ε/a above which 4d/(πa) and its like are far from the ultimate point: at 0.3 the ultimate gain is 40 % low.
 const WIDE_HYSTERESIS: f64 = 0.3;
 
 /// Columns of a test, one entry a sample. A row's setpoint and MV apply from its time until the next; its PV was

@@ -193,7 +193,7 @@ impl Relay {
         }
     }
 
-    // The factor is open in Campos et al., CBA 2014: three standard deviations keep all but a few samples apart.
+    // The factor is open in Silva et al., CBA 2014: three standard deviations keep all but a few samples apart.
     fn default_hysteresis() -> Hysteresis {
         Hysteresis::Noise(3.0)
     }

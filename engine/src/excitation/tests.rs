@@ -116,7 +116,8 @@ fn relay_finding(report: &ExcitationReport) -> RelayFinding {
 /// Period and amplitude of the limit cycle of a FOPDT under a symmetric relay with hysteresis.
 ///
 /// After a switch at y = ε the PV goes on for L towards the value left, then turns: `a = Kd − (Kd − ε) e^(−L/T)`,
-/// `Pu = 2 (L + T ln((Kd + a)/(Kd − ε)))`. Source: Wang, Hang & Zou, Ind. Eng. Chem. Res. 36 (1997) 3173.
+/// `Pu = 2 (L + T ln((Kd + a)/(Kd − ε)))`. Both are the first-order
+/// answer between two switches.
 fn limit_cycle(model: Fopdt, d: f64, width: f64) -> (f64, f64) {
     let (kd, t) = (model.gain.abs() * d, model.time_constant_s);
     let amplitude = kd - (kd - width) * (-model.dead_time_s / t).exp();
@@ -124,7 +125,7 @@ fn limit_cycle(model: Fopdt, d: f64, width: f64) -> (f64, f64) {
 }
 
 #[test]
-fn val_a_relay_finds_the_limit_cycle_of_its_closed_form() {
+fn a_relay_finds_the_limit_cycle_of_its_closed_form() {
     for (model, d, width) in [
         (fopdt(2.0, 10.0, 3.0), 0.5, 0.0),
         (fopdt(2.0, 10.0, 3.0), 0.5, 0.15),
@@ -236,7 +237,7 @@ fn a_binary_sequence_is_sent_bit_by_bit() {
 }
 
 #[test]
-fn val_stepped_sines_give_the_frequency_response() {
+fn stepped_sines_give_the_frequency_response() {
     let model = fopdt(2.0, 20.0, 3.0);
     let frequencies = vec![0.02, 0.1, 0.3, 1.0, 2.2];
     for noise_sd in [0.0, 0.02] {
@@ -258,7 +259,7 @@ fn val_stepped_sines_give_the_frequency_response() {
 }
 
 #[test]
-fn val_the_ultimate_gain_is_found_from_below_and_from_above() {
+fn the_ultimate_gain_is_found_from_below_and_from_above() {
     let model = fopdt(2.0, 20.0, 3.0);
     let exact = ultimate(&ProcessModel::Fopdt(model)).expect("a limit");
     for (gain, start, noise_sd) in
