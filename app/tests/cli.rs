@@ -121,10 +121,37 @@ fn what_is_simulated_is_identified() {
     let (whole, status) =
         json(&["identify", csv, "--pv", "pv", "--mv", "mv", "--structure", "fopdt", "--json"]);
     assert_eq!(status, 0);
-    assert_eq!(keys(&whole), ["chosen", "columns", "models", "repairs", "warnings"]);
+    let parts = [
+        "chosen",
+        "columns",
+        "controller",
+        "criterion",
+        "models",
+        "oscillation",
+        "repairs",
+        "runner_up",
+        "warnings",
+    ];
+    assert_eq!(keys(&whole), parts);
     let model = &whole["models"][0];
-    let expected =
-        ["K", "L_s", "T_s", "aic", "bias", "fit_percent", "interval_95", "mse", "structure", "verdict"];
+    let expected = [
+        "K",
+        "L_s",
+        "T_s",
+        "aic",
+        "bias",
+        "drift_per_s",
+        "fit_percent",
+        "interval_95",
+        "mse",
+        "mv_at_rest",
+        "r2",
+        "residuals",
+        "rows",
+        "structure",
+        "verdict",
+        "verdicts",
+    ];
     assert_eq!(keys(model), expected);
     let near = |key: &str, expected: f64, tolerance: f64| {
         let value = model[key].as_f64().expect("a number");
@@ -276,7 +303,9 @@ fn bad_input_ends_with_2_and_says_what_to_do() {
         (&["analyze", "--model", MODEL, "--gains", "Kc=0"][..], "Kc = 0"),
         (&["identify", &missing][..], "nothing.csv"),
         (&["identify", binary][..], "export"),
-        (&["identify", &missing, "--structure", "sopdt"][..], "not available yet"),
+        (&["identify", &missing, "--structure", "arx"][..], "sopdt_zero"),
+        (&["identify", &missing, "--drift", "cubic"][..], "linear"),
+        (&["identify", &missing, "--mv-min", "5", "--mv-max", "1"][..], "must lie below"),
         (&["simulate", &missing][..], "nothing.csv"),
         (&["simulate", &missing, "-o", "x.parquet"][..], "not available yet"),
         (&["serve"][..], "not available yet"),

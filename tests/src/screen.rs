@@ -86,6 +86,7 @@ pub fn typed_model() -> Action {
         model: ProcessModel::Fopdt(Fopdt::new(4.9, 152.0, 2.0).expect("usable")),
         origin: ModelOrigin::Typed,
         fit: None,
+        study: None,
         rows: None,
         pv_unit: "cm".to_owned(),
         mv_unit: "V".to_owned(),

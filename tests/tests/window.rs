@@ -13,6 +13,7 @@ use vasos_app::panes::pid::model::PidModel;
 use vasos_app::workbench::{Options, Workbench};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
 use vasos_engine::document::{Candidate, DocumentCommand, LogRoles, SourceChoice, Stretch};
+use vasos_engine::model::ProcessModel;
 use vasos_engine::session::RigCommand;
 use vasos_tests::typed_model;
 
@@ -185,14 +186,14 @@ fn from_a_dropped_log_to_a_tuned_loop() {
     harness.get_by_label("Use this log").click();
     wait(&mut harness, "the log", |w| w.document().log.is_some());
     let roles = harness.state().document().roles;
-    assert_eq!(roles, LogRoles { pv: Some(0), sp: None, mv: Some(1) });
+    assert_eq!(roles, LogRoles { pv: Some(0), mv: Some(1), ..LogRoles::default() });
     assert_eq!(harness.state().document().source, SourceChoice::Log);
     let stretch = Stretch { from_s: 20.0, to_s: 900.0 };
     act(&mut harness, Action::Document(DocumentCommand::Stretch(Some(stretch))));
     harness.get_by_label("Fit model").click();
     wait(&mut harness, "a model", |w| w.document().model().is_some());
     let fit = harness.state().document().model().and_then(|m| m.fit.clone()).expect("fitted");
-    let m = fit.model;
+    let ProcessModel::Fopdt(m) = fit.model else { panic!("{:?}", fit.model) };
     assert!(
         (m.gain - 4.9).abs() < 0.02
             && (m.time_constant_s - 80.0).abs() < 1.0

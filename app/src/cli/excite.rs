@@ -263,7 +263,7 @@ fn as_json(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Valu
             "L_s": m.dead_time_s,
             "interval_95": {"K": i.gain, "T_s": i.time_constant_s, "L_s": i.dead_time_s},
             "fit_percent": told.fit.fit_percent,
-            "verdict": told.fit.verdict().to_string(),
+            "verdict": told.verdicts.first().map(ToString::to_string),
             "Ku": told.ultimate.map(|u| u.ku),
             "Pu_s": told.ultimate.map(|u| u.pu_s),
         })
@@ -355,7 +355,7 @@ fn model_text(told: &Identified) -> String {
         single("Pu of the model (s)", told.ultimate.map(|u| u.pu_s)),
     ];
     let mut text = table(&rows);
-    for verdict in &told.fit.verdicts {
+    for verdict in &told.verdicts {
         text.push_str(&format!("{verdict}\n"));
     }
     for warning in &told.warnings {

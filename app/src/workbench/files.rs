@@ -33,7 +33,13 @@ impl ImportSheet {
     pub fn new(path: PathBuf, log: ImportedLog) -> Self {
         let proposed = &log.report.roles;
         let index = |name: &Option<String>| name.as_deref().and_then(|n| log.table.index_of(n));
-        let roles = LogRoles { pv: index(&proposed.pv), sp: index(&proposed.sp), mv: index(&proposed.mv) };
+        let roles = LogRoles {
+            pv: index(&proposed.pv),
+            sp: index(&proposed.sp),
+            mv: index(&proposed.mv),
+            mode: index(&proposed.mode),
+            disturbance: None,
+        };
         Self { path, log, roles, sample_time_s: 1.0 }
     }
 }

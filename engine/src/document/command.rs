@@ -8,7 +8,7 @@ use super::data::{
 };
 use crate::control::{GainsError, Law, LoopOptions, LoopSpec, Mode, PidTuning, check_filter, check_loop};
 use crate::explain::{Explain, number};
-use crate::identify::FopdtFit;
+use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network, RigError};
 use crate::session::CommandError;
@@ -69,7 +69,9 @@ pub struct NewModel {
     /// Where it comes from.
     pub origin: ModelOrigin,
     /// The fit that gave it.
-    pub fit: Option<Arc<FopdtFit>>,
+    pub fit: Option<Arc<ModelFit>>,
+    /// The study of the stretch that the fit is part of.
+    pub study: Option<Arc<LoopStudy>>,
     /// The rows it was fitted to.
     pub rows: Option<Arc<FittedRows>>,
     /// Unit of its PV.
@@ -341,8 +343,8 @@ impl Document {
 
     fn add_model(&mut self, new: &NewModel) {
         let number = self.models.iter().map(|m| m.number).max().unwrap_or(0) + 1;
-        let NewModel { model, origin, fit, rows, pv_unit, mv_unit } = new.clone();
-        self.models.push(ModelEntry { number, model, origin, fit, rows, pv_unit, mv_unit });
+        let NewModel { model, origin, fit, study, rows, pv_unit, mv_unit } = new.clone();
+        self.models.push(ModelEntry { number, model, origin, fit, study, rows, pv_unit, mv_unit });
         self.model_in_use = Some(number);
         self.candidate = None;
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::control::{Law, LoopOptions, LoopSpec, Mode, PidGains, PidTuning, outer_of};
-use crate::identify::FopdtFit;
+use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
 use crate::session::Rig;
@@ -149,6 +149,10 @@ pub struct LogRoles {
     pub sp: Option<usize>,
     /// Manipulated variable.
     pub mv: Option<usize>,
+    /// Mode of the controller.
+    pub mode: Option<usize>,
+    /// Measured disturbance.
+    pub disturbance: Option<usize>,
 }
 
 /// A stretch of time in seconds.
@@ -200,7 +204,9 @@ pub struct ModelEntry {
     /// Where it comes from.
     pub origin: ModelOrigin,
     /// The fit that gave it.
-    pub fit: Option<Arc<FopdtFit>>,
+    pub fit: Option<Arc<ModelFit>>,
+    /// The study of the stretch that the fit is part of.
+    pub study: Option<Arc<LoopStudy>>,
     /// The rows it was fitted to.
     pub rows: Option<Arc<FittedRows>>,
     /// Unit of its PV, as shown.

@@ -6,7 +6,7 @@ use super::progress::Envelope;
 use super::spec::{Excitation, Signal};
 use super::stop::StopReason;
 use crate::explain::{Explain, number};
-use crate::identify::{FitError, FitProblem, FopdtFit, fit_fopdt};
+use crate::identify::{FitError, FitProblem, FitVerdict, FopdtFit, Structure, fit_fopdt, fit_model};
 use crate::model::ProcessModel;
 use crate::tune::{Ultimate, ultimate};
 
@@ -253,6 +253,8 @@ impl ExcitationWarning {
 pub struct Identified {
     /// First order with dead time, with its intervals and verdicts.
     pub fit: FopdtFit,
+    /// What the fit has to say, most important first; never empty.
+    pub verdicts: Vec<FitVerdict>,
     /// Ku and Pu of that model; absent where no proportional gain brings it to its limit.
     pub ultimate: Option<Ultimate>,
     /// What has to be said about it besides the verdicts of the fit.
@@ -265,7 +267,9 @@ pub struct Identified {
 /// [`FitError`] of the record.
 pub fn identify_report(report: &ExcitationReport) -> Result<Identified, FitError> {
     let Record { time_s, pv, mv, .. } = &report.record;
-    let fit = fit_fopdt(&FitProblem::new(time_s, pv, mv))?;
+    let problem = FitProblem::new(time_s, pv, mv);
+    let fit = fit_fopdt(&problem)?;
+    let verdicts = fit_model(&problem, Structure::Fopdt)?.verdicts;
     let ultimate = ultimate(&ProcessModel::Fopdt(fit.model));
     let found = match &report.finding {
         Finding::Relay(relay) => Some(relay.ku),
@@ -274,5 +278,5 @@ pub fn identify_report(report: &ExcitationReport) -> Result<Identified, FitError
     };
     let gain = fit.model.gain;
     let turned = found.filter(|ku| ku * gain < 0.0).map(|_| ExcitationWarning::OtherSign { gain });
-    Ok(Identified { fit, ultimate, warnings: turned.into_iter().collect() })
+    Ok(Identified { fit, verdicts, ultimate, warnings: turned.into_iter().collect() })
 }

@@ -1,14 +1,13 @@
 //! The first-order-plus-dead-time fit by output error.
 
+use super::FitError;
 use super::gram::Linear;
-use super::judge::verdicts;
 use super::optimise::{Bounds, Point, evaluate, no_reference, refine};
 use super::problem::{FitProblem, Stretch};
 use super::profile::dead_time_interval;
 use super::response::{Dynamics, residuals};
 use super::start::starts;
 use super::statistics::{inverse, student_95};
-use super::{FitError, FitVerdict};
 use crate::model::Fopdt;
 
 /// Rows above which a start is sought on a thinned-out copy.
@@ -64,8 +63,6 @@ pub struct FopdtFit {
     pub segments: usize,
     /// Free run ŷ, one value a row, in PV units.
     pub simulated: Vec<f64>,
-    /// Findings, most important first; never empty.
-    pub verdicts: Vec<FitVerdict>,
     /// Passes over all rows.
     pub passes: usize,
     /// Passes over thinned-out copies.
@@ -73,12 +70,6 @@ pub struct FopdtFit {
 }
 
 impl FopdtFit {
-    /// The finding that comes first.
-    #[must_use]
-    pub fn verdict(&self) -> &FitVerdict {
-        &self.verdicts[0]
-    }
-
     /// y − ŷ, in PV units.
     #[must_use]
     pub fn residuals(&self, pv: &[f64]) -> Vec<f64> {
@@ -113,7 +104,6 @@ pub fn fit_fopdt(problem: &FitProblem) -> Result<FopdtFit, FitError> {
     if let Some(interval) = dead_time_interval(&stretch, &best, &bounds, error_s, t95, &mut work.passes) {
         fit.interval_95.dead_time_s = interval;
     }
-    fit.verdicts = verdicts(&fit, &stretch, problem);
     (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
     Ok(fit)
 }
@@ -272,7 +262,6 @@ fn report(stretch: &Stretch, best: &Point) -> Option<FopdtFit> {
         rows,
         segments: stretch.segments.len(),
         simulated,
-        verdicts: Vec::new(),
         passes: 0,
         thinned_passes: 0,
     })

@@ -1,59 +1,44 @@
 //! From the numbers of a fit to findings about it.
 
 use super::FitVerdict;
-use super::fopdt::{FopdtFit, Interval};
+use super::model_fit::ModelFit;
+use super::parameters::Parameter;
 use super::problem::{FitProblem, Stretch};
-use super::statistics::{lag_one_correlation, resolution};
+use super::statistics::resolution;
+
+/// Half width of the gain's interval, in percent, that passes for known.
+const GAIN_KNOWN_PERCENT: f64 = 20.0;
+/// Half width of another parameter's interval, in percent, that passes for known.
+const KNOWN_PERCENT: f64 = 50.0;
+const POOR_PERCENT: f64 = 50.0;
+/// Correlation of neighbouring residuals worth a word.
+const CORRELATED: f64 = 0.3;
 
 /// Findings, objections first; never empty.
-pub(super) fn verdicts(fit: &FopdtFit, stretch: &Stretch, problem: &FitProblem) -> Vec<FitVerdict> {
-    /// Half width of K's interval, in percent, that passes for known.
-    const GAIN_KNOWN_PERCENT: f64 = 20.0;
-    const POOR_PERCENT: f64 = 50.0;
-    const CORRELATED: f64 = 0.5;
-    let half = |i: Interval, value: f64| 100.0 * (i[1] - value) / value.abs();
-    let gain_percent = half(fit.interval_95.gain, fit.model.gain);
-    let (t, l) = (fit.model.time_constant_s, fit.model.dead_time_s);
-    let sample_time_s = stretch.sample_time_s;
+pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) -> Vec<FitVerdict> {
     let mut found = Vec::new();
     if fit.fit_percent < POOR_PERCENT {
         found.push(FitVerdict::Poor { fit_percent: fit.fit_percent });
     }
-    if t > stretch.span_s() {
-        found.push(FitVerdict::TimeConstantLong { time_constant_s: t, span_s: stretch.span_s() });
-    } else if gain_percent > GAIN_KNOWN_PERCENT {
-        found.push(FitVerdict::GainUncertain { percent: gain_percent, times: gain_percent / 10.0 });
-    }
-    if t < sample_time_s / 3.0 {
-        found.push(FitVerdict::TimeConstantShort { time_constant_s: t, sample_time_s });
-    }
-    let [lower, upper] = fit.interval_95.dead_time_s;
-    if lower <= 0.0 && upper > sample_time_s {
-        found.push(FitVerdict::DeadTimeUnknown {
-            upper_s: upper,
-            times: ((upper - l) / l.max(sample_time_s)).max(1.0),
-        });
-    }
-    let sd = fit.mse.sqrt();
-    if let Some(step) = resolution(problem.pv)
-        && sd < 0.5 * step
-    {
-        let (low, high) =
-            fit.simulated.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        if high - low < 20.0 * step {
-            found.push(FitVerdict::ResolutionLimited { resolution: step, levels: (high - low) / step });
+    parameters(fit, stretch, &mut found);
+    for d in &fit.disturbances {
+        let [low, high] = d.parameters[0].interval_95;
+        if low.is_nan() || high.is_nan() || low * high <= 0.0 {
+            found.push(FitVerdict::DisturbanceUnknown { name: d.name.clone() });
         }
     }
-    let correlation = lag_one_correlation(problem.pv.iter().zip(&fit.simulated).map(|(y, s)| y - s));
-    if correlation > CORRELATED && fit.fit_percent < 99.9 {
-        found.push(FitVerdict::ResidualsCorrelated { correlation });
-    }
+    found.extend(too_coarse(fit, problem));
+    residuals(fit, &mut found);
     if found.is_empty() {
+        let gain = &fit.parameters[0];
         found.push(FitVerdict::Good {
             fit_percent: fit.fit_percent,
-            gain_percent,
-            time_constant_percent: half(fit.interval_95.time_constant_s, t),
+            gain: gain.name,
+            gain_percent: half_percent(gain),
         });
+    }
+    if let Some((per_second, _)) = fit.drift {
+        found.push(FitVerdict::Drift { per_hour: 3600.0 * per_second });
     }
     if fit.segments > 1 {
         found.push(FitVerdict::Segments { count: fit.segments });
@@ -62,4 +47,88 @@ pub(super) fn verdicts(fit: &FopdtFit, stretch: &Stretch, problem: &FitProblem) 
         found.push(FitVerdict::StartsAtRest { mv_before: stretch.u_before });
     }
     found
+}
+
+/// Half the interval in percent of the value.
+fn half_percent(p: &Parameter) -> f64 {
+    100.0 * (p.interval_95[1] - p.value) / p.value.abs()
+}
+
+fn parameters(fit: &ModelFit, stretch: &Stretch, found: &mut Vec<FitVerdict>) {
+    let moved = movement(stretch);
+    let gain = half_percent(&fit.parameters[0]);
+    let slowest = fit.parameter("T_s").map_or(0.0, |t| t.value);
+    if slowest > stretch.span_s() {
+        let span_s = stretch.span_s();
+        found.push(FitVerdict::TimeConstantLong { time_constant_s: slowest, span_s });
+    } else if gain.is_nan() || gain > GAIN_KNOWN_PERCENT {
+        let percent = if gain.is_nan() { f64::INFINITY } else { gain };
+        found.push(FitVerdict::GainUncertain { percent, mv_move: moved * percent / 10.0, mv_moved: moved });
+    }
+    let sample_time_s = stretch.sample_time_s;
+    if fit.structure != super::Structure::Ipdt && slowest < sample_time_s / 3.0 {
+        found.push(FitVerdict::TimeConstantShort { time_constant_s: slowest, sample_time_s });
+    }
+    let others = [("T_s", "T"), ("T2_s", "T2"), ("zeta", "zeta"), ("Tz_s", "Tz")];
+    for (name, symbol) in others {
+        if let Some(p) = fit.parameter(name)
+            && slowest <= stretch.span_s()
+            && p.value.abs() > sample_time_s / 3.0
+        {
+            let percent = half_percent(p);
+            if percent > KNOWN_PERCENT {
+                let mv_move = moved * percent / 20.0;
+                found.push(FitVerdict::ParameterUncertain { name: symbol, percent, mv_move });
+            }
+        }
+    }
+    if let Some(l) = fit.parameter("L_s") {
+        let [lower, upper] = l.interval_95;
+        if lower <= 0.0 && (upper.is_nan() || upper > sample_time_s) {
+            let times = ((upper - l.value) / l.value.max(sample_time_s)).max(1.0);
+            found.push(FitVerdict::DeadTimeUnknown { upper_s: upper, mv_move: moved * times });
+        }
+    }
+}
+
+/// From the lowest to the highest MV, in MV units.
+fn movement(stretch: &Stretch) -> f64 {
+    let (low, high) = range(stretch.u.iter());
+    high.max(stretch.u_before) - low.min(stretch.u_before)
+}
+
+fn range<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
+}
+
+/// Residuals smaller than a step of a PV that moves by few of them.
+fn too_coarse(fit: &ModelFit, problem: &FitProblem) -> Option<FitVerdict> {
+    let step = resolution(problem.pv)?;
+    let (low, high) = range(fit.simulated.iter());
+    let levels = (high - low) / step;
+    (fit.mse.sqrt() < 0.5 * step && levels < 20.0)
+        .then_some(FitVerdict::ResolutionLimited { resolution: step, levels })
+}
+
+fn residuals(fit: &ModelFit, found: &mut Vec<FitVerdict>) {
+    // Leftovers this small are rounding, whatever their pattern.
+    if fit.fit_percent > 99.9 {
+        return;
+    }
+    let tests = &fit.tests;
+    if tests.follows_input() {
+        let (lag, correlation) = tests
+            .cross_correlation
+            .iter()
+            .copied()
+            .enumerate()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .unwrap_or((0, 0.0));
+        found.push(FitVerdict::ResidualsFollowInput { correlation, lag });
+    }
+    let neighbours = tests.autocorrelation.first().copied().unwrap_or(0.0);
+    if !tests.is_white() && neighbours > CORRELATED {
+        let rows = tests.rows_per_independent;
+        found.push(FitVerdict::ResidualsCorrelated { correlation: neighbours, rows });
+    }
 }

@@ -21,6 +21,18 @@ pub enum InitialState {
     Rest,
 }
 
+/// Whether a slow drift of the PV that goes with no input is fitted along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Drift {
+    /// None.
+    #[default]
+    None,
+    /// A straight line.
+    Linear,
+    /// A straight line where it explains far more than chance would.
+    Auto,
+}
+
 /// What the user may say about a stretch besides its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitOptions {
@@ -28,6 +40,8 @@ pub struct FitOptions {
     pub mv_before: Option<f64>,
     /// What is known of the state before the first row.
     pub initial_state: InitialState,
+    /// Slow drift of the PV.
+    pub drift: Drift,
     /// Name of the time column, for messages.
     pub time_name: String,
     /// Name of the PV column, for messages.
@@ -43,6 +57,7 @@ impl Default for FitOptions {
         Self {
             mv_before: None,
             initial_state: InitialState::Free,
+            drift: Drift::None,
             time_name: "time".to_owned(),
             pv_name: "PV".to_owned(),
             mv_name: "MV".to_owned(),
@@ -62,13 +77,26 @@ pub struct FitProblem<'a> {
     pub mv: &'a [f64],
     /// What else is known.
     pub options: FitOptions,
+    /// Measured disturbances: further inputs of the same PV, each of N rows.
+    pub disturbances: Vec<Disturbance<'a>>,
+    /// Rows whose PV counts; absent: all. The MV of the others holds all the same.
+    pub keep: Option<Cow<'a, [bool]>>,
+}
+
+/// Another input of the PV, with its own dynamics.
+#[derive(Debug, Clone)]
+pub struct Disturbance<'a> {
+    /// Name of the column.
+    pub name: String,
+    /// Values, applied from their stamp until the next, in their own units.
+    pub values: &'a [f64],
 }
 
 impl<'a> FitProblem<'a> {
     /// A stretch with default options.
     #[must_use]
     pub fn new(time_s: &'a [f64], pv: &'a [f64], mv: &'a [f64]) -> Self {
-        Self { time_s, pv, mv, options: FitOptions::default() }
+        Self { time_s, pv, mv, options: FitOptions::default(), disturbances: vec![], keep: None }
     }
 
     /// Checks the columns and finds the sample time and the segments.
@@ -100,7 +128,15 @@ impl<'a> FitProblem<'a> {
             return Err(FitError::SameColumn { pv_name, mv_name });
         }
         let free = o.initial_state == InitialState::Free && !mv_still;
-        Ok(Stretch::new(self.time_s.into(), self.mv.into(), self.pv.into(), u_before, free))
+        let mut stretch = Stretch::new(self.time_s.into(), self.mv.into(), self.pv.into(), u_before, free);
+        stretch.others = self.disturbances.iter().map(|d| Other::new(d.values.into())).collect();
+        if let Some(keep) = self.keep.clone().filter(|keep| keep.len() == stretch.len()) {
+            stretch.keep_only(keep);
+        }
+        if stretch.kept() < MIN_ROWS {
+            return Err(FitError::TooFewSamples { rows: stretch.kept(), needed: MIN_ROWS });
+        }
+        Ok(stretch)
     }
 
     /// Checks lengths, numbers and the order of time.
@@ -116,7 +152,18 @@ impl<'a> FitProblem<'a> {
                 mv_name: o.mv_name.clone(),
             });
         }
-        for (column, values) in [(&o.time_name, self.time_s), (&o.pv_name, self.pv), (&o.mv_name, self.mv)] {
+        let others = self.disturbances.iter().map(|d| (&d.name, d.values));
+        if let Some(other) = self.disturbances.iter().find(|d| d.values.len() != rows) {
+            return Err(FitError::LengthMismatch {
+                time: rows,
+                pv: self.pv.len(),
+                mv: other.values.len(),
+                pv_name: o.pv_name.clone(),
+                mv_name: other.name.clone(),
+            });
+        }
+        let columns = [(&o.time_name, self.time_s), (&o.pv_name, self.pv), (&o.mv_name, self.mv)];
+        for (column, values) in columns.into_iter().chain(others) {
             if let Some(i) = first_not_finite(values) {
                 return Err(FitError::NotFinite {
                     column: column.clone(),
@@ -173,6 +220,41 @@ pub(super) struct Stretch<'a> {
     pub segments: Vec<usize>,
     /// Whether the initial state of each segment is estimated.
     pub free: bool,
+    /// Further inputs.
+    pub others: Vec<Other<'a>>,
+    /// Rows whose PV counts; absent: all.
+    pub keep: Option<Cow<'a, [bool]>>,
+}
+
+/// A further input with the values it is centred with.
+#[derive(Debug, Clone)]
+pub(super) struct Other<'a> {
+    pub values: Cow<'a, [f64]>,
+    pub before: f64,
+    pub reference: f64,
+}
+
+impl<'a> Other<'a> {
+    fn new(values: Cow<'a, [f64]>) -> Self {
+        Self { before: values[0], reference: mean(&values), values }
+    }
+}
+
+/// An input as a pass reads it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Input<'a> {
+    pub values: &'a [f64],
+    /// Value before the first row.
+    pub before: f64,
+    /// Value taken off.
+    pub reference: f64,
+}
+
+impl Input<'_> {
+    /// Value of a row, `None` for the time before the first, less the reference.
+    pub fn centred(&self, row: Option<usize>) -> f64 {
+        row.map_or(self.before, |k| self.values[k]) - self.reference
+    }
 }
 
 impl<'a> Stretch<'a> {
@@ -192,7 +274,37 @@ impl<'a> Stretch<'a> {
             }
         }
         let (u_ref, y_ref) = (mean(&u), mean(&y));
-        Self { t, u, y, u_before, u_ref, y_ref, sample_time_s, uniform, segments, free }
+        let (others, keep) = (vec![], None);
+        Self { t, u, y, u_before, u_ref, y_ref, sample_time_s, uniform, segments, free, others, keep }
+    }
+
+    /// Lets only the rows marked with `true` count.
+    pub fn keep_only(&mut self, keep: Cow<'a, [bool]>) {
+        let kept = keep.iter().filter(|k| **k).count();
+        let sum: f64 = self.y.iter().zip(keep.iter()).map(|(y, k)| if *k { *y } else { 0.0 }).sum();
+        self.y_ref = sum / kept.max(1) as f64;
+        self.keep = (kept < keep.len()).then_some(keep);
+    }
+
+    /// Rows that count.
+    pub fn kept(&self) -> usize {
+        self.keep.as_ref().map_or(self.len(), |keep| keep.iter().filter(|k| **k).count())
+    }
+
+    /// Whether a row counts.
+    pub fn counts(&self, row: usize) -> bool {
+        self.keep.as_ref().is_none_or(|keep| keep[row])
+    }
+
+    /// The MV as input 0, then the others.
+    pub fn input(&self, i: usize) -> Input<'_> {
+        match i.checked_sub(1) {
+            None => Input { values: &self.u, before: self.u_before, reference: self.u_ref },
+            Some(i) => {
+                let other = &self.others[i];
+                Input { values: &other.values, before: other.before, reference: other.reference }
+            }
+        }
     }
 
     /// Rows.
@@ -221,29 +333,50 @@ impl<'a> Stretch<'a> {
         let rows = self.len() / factor + self.segments.len();
         let (mut t, mut u, mut y) =
             (Vec::with_capacity(rows), Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let mut others = vec![Vec::with_capacity(rows); self.others.len()];
+        let mut keep = Vec::with_capacity(rows);
         for s in 0..self.segments.len() {
             let range = self.segment(s);
             for first in range.clone().step_by(factor) {
                 let next = (first + factor).min(range.end);
                 let half = (factor / 2).min(first - range.start).min(range.end - 1 - first);
                 t.push(self.t[first]);
-                u.push(self.mean_mv(first, next));
-                y.push(mean(&self.y[first - half..=first + half]));
+                u.push(self.held_mean(&self.u, first, next));
+                for (other, values) in others.iter_mut().zip(&self.others) {
+                    other.push(self.held_mean(&values.values, first, next));
+                }
+                let around = first - half..=first + half;
+                if self.keep.is_none() {
+                    y.push(mean(&self.y[around]));
+                } else {
+                    let kept: Vec<f64> = around.filter(|&k| self.counts(k)).map(|k| self.y[k]).collect();
+                    keep.push(!kept.is_empty());
+                    y.push(if kept.is_empty() { self.y_ref } else { mean(&kept) });
+                }
             }
         }
-        Stretch::new(t.into(), u.into(), y.into(), self.u_before, self.free)
+        let mut copy = Stretch::new(t.into(), u.into(), y.into(), self.u_before, self.free);
+        copy.others = others
+            .into_iter()
+            .zip(&self.others)
+            .map(|(values, other)| Other { before: other.before, ..Other::new(values.into()) })
+            .collect();
+        if self.keep.is_some() {
+            copy.keep_only(keep.into());
+        }
+        copy
     }
 
-    fn mean_mv(&self, first: usize, next: usize) -> f64 {
+    fn held_mean(&self, values: &[f64], first: usize, next: usize) -> f64 {
         if self.uniform {
-            return mean(&self.u[first..next]);
+            return mean(&values[first..next]);
         }
         let last = next.min(self.len() - 1);
         let length = self.t[last] - self.t[first];
         if length <= 0.0 {
-            return mean(&self.u[first..next]);
+            return mean(&values[first..next]);
         }
-        (first..last).map(|k| self.u[k] * (self.t[k + 1] - self.t[k])).sum::<f64>() / length
+        (first..last).map(|k| values[k] * (self.t[k + 1] - self.t[k])).sum::<f64>() / length
     }
 }
 

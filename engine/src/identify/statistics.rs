@@ -43,17 +43,6 @@ pub(super) fn inverse(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j] / (scale[i] * scale[j]))))
 }
 
-/// Correlation of neighbouring residuals.
-pub(super) fn lag_one_correlation(residuals: impl Iterator<Item = f64>) -> f64 {
-    let (mut squares, mut products, mut last) = (0.0, 0.0, 0.0);
-    for r in residuals {
-        squares += r * r;
-        products += r * last;
-        last = r;
-    }
-    if squares > 0.0 { products / squares } else { 0.0 }
-}
-
 /// Step of a quantised signal: the smallest move, when all moves are multiples of it and there are few levels.
 pub(super) fn resolution(values: &[f64]) -> Option<f64> {
     /// Rows looked at.

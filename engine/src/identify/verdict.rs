@@ -2,17 +2,36 @@
 
 use crate::explain::{Explain, number};
 
-/// One finding about a fit; a fit without objections has [`FitVerdict::Good`] alone.
+/// One finding about a fit; a fit without objections has [`FitVerdict::Good`] first.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FitVerdict {
     /// Nothing to object to.
     Good {
         /// Fit in percent.
         fit_percent: f64,
-        /// Half the 95 % interval of K, in percent of K.
+        /// Gain, `K` or `Kv`.
+        gain: &'static str,
+        /// Half the 95 % interval of the gain, in percent of it.
         gain_percent: f64,
-        /// Half the 95 % interval of T, in percent of T.
-        time_constant_percent: f64,
+    },
+    /// Feedback alone moves the MV: the stretch cannot tell the process from the controller.
+    NoExcitation {
+        /// Name of the MV column.
+        mv_name: String,
+        /// Part of the MV's moves that follows from the PV, in percent.
+        explained_percent: f64,
+    },
+    /// Disturbances move the PV more than the few moves of the setpoint do.
+    Disturbed {
+        /// Fit in percent.
+        fit_percent: f64,
+        /// Part of the MV's moves that follows from the PV, in percent.
+        explained_percent: f64,
+    },
+    /// A measured disturbance that does not move the PV beyond doubt.
+    DisturbanceUnknown {
+        /// Name of its column.
+        name: String,
     },
     /// The model explains little of the PV's movement.
     Poor {
@@ -21,17 +40,28 @@ pub enum FitVerdict {
     },
     /// The move was too small for the noise.
     GainUncertain {
-        /// Half the 95 % interval of K, in percent of K.
+        /// Half the 95 % interval of the gain, in percent of it.
         percent: f64,
-        /// How many times as large a move would bring it to ±10 %.
-        times: f64,
+        /// Move of the MV that would bring it to ±10 %, in MV units.
+        mv_move: f64,
+        /// Largest move there was, in MV units.
+        mv_moved: f64,
+    },
+    /// A time constant, damping or zero that the noise hides.
+    ParameterUncertain {
+        /// `T`, `T2`, `zeta` or `Tz`.
+        name: &'static str,
+        /// Half the 95 % interval, in percent of the value.
+        percent: f64,
+        /// Move of the MV that would bring it to ±20 %, in MV units.
+        mv_move: f64,
     },
     /// The interval of L reaches 0.
     DeadTimeUnknown {
         /// Upper end of the interval, in seconds.
         upper_s: f64,
-        /// How many times as large a move would bring its lower end off 0.
-        times: f64,
+        /// Move of the MV that would bring its lower end off 0, in MV units.
+        mv_move: f64,
     },
     /// T cannot be told from a stretch shorter than it.
     TimeConstantLong {
@@ -54,17 +84,31 @@ pub enum FitVerdict {
         /// How many steps the modelled movement is high.
         levels: f64,
     },
-    /// Residuals are not white: the intervals are too narrow.
+    /// Residuals are not white; the intervals allow for it.
     ResidualsCorrelated {
         /// Correlation of neighbouring residuals.
         correlation: f64,
+        /// Rows that say as much as one independent row.
+        rows: f64,
+    },
+    /// Residuals still follow the MV: there is more in the process than in the model.
+    ResidualsFollowInput {
+        /// Largest correlation with an earlier move.
+        correlation: f64,
+        /// Rows after the move.
+        lag: usize,
+    },
+    /// A drift was fitted along.
+    Drift {
+        /// In PV units per hour.
+        per_hour: f64,
     },
     /// The stretch has gaps.
     Segments {
         /// Pieces fitted with a free state each.
         count: usize,
     },
-    /// The MV never moves after the first row: the start was taken to be at rest.
+    /// The start was taken to be at rest: the PV stands still ahead of the first move, or that move was the first row.
     StartsAtRest {
         /// MV before the first row, in MV units.
         mv_before: f64,
@@ -73,61 +117,91 @@ pub enum FitVerdict {
 
 impl std::fmt::Display for FitVerdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
         match self {
-            Self::Good { fit_percent, gain_percent, time_constant_percent } => write!(
+            Self::Good { fit_percent, gain, gain_percent } => write!(
                 f,
-                "good: the model explains the movement to {} %; K is known to ±{} %, T to ±{} %",
-                number(*fit_percent),
-                number(*gain_percent),
-                number(*time_constant_percent)
+                "good: the model explains the movement to {} %; {gain} is known to ±{} %",
+                n(*fit_percent),
+                n(*gain_percent)
             ),
+            Self::NoExcitation { mv_name, explained_percent } => write!(
+                f,
+                "nothing but feedback moves {mv_name} here ({} % of its moves follow from the PV): such a stretch shows the controller, not the process, and cannot tell a gain or a dead time; move the setpoint, or the output in manual, by a step that stands out of the noise",
+                n(*explained_percent)
+            ),
+            Self::Disturbed { fit_percent, explained_percent } => write!(
+                f,
+                "disturbances rule this stretch: the model explains {} % of the PV, and {} % of the MV's moves are feedback; what a few small moves of the setpoint show is no model, move it further and more often",
+                n(*fit_percent),
+                n(*explained_percent)
+            ),
+            Self::DisturbanceUnknown { name } => {
+                write!(f, "{name} does not move the PV beyond doubt here: leave it out, or record it moving")
+            }
             Self::Poor { fit_percent } => write!(
                 f,
-                "the fit is poor ({} %): the MV explains little of this PV's movement, or a first-order model is the wrong one",
-                number(*fit_percent)
+                "the fit is poor ({} %): the MV explains little of this PV's movement, or the structure is the wrong one",
+                n(*fit_percent)
             ),
-            Self::GainUncertain { percent, times } => write!(
+            Self::GainUncertain { percent, mv_move, mv_moved } => write!(
                 f,
-                "the move was too small for this noise: the gain is known only to ±{} %; a move {} times as large would give ±10 %",
-                number(*percent),
-                number(*times)
+                "the move was too small for this noise: the gain is known only to ±{} %; a move of the MV by {} instead of {} would give ±10 %",
+                n(*percent),
+                n(*mv_move),
+                n(*mv_moved)
             ),
-            Self::DeadTimeUnknown { upper_s, times } => write!(
+            Self::ParameterUncertain { name, percent, mv_move } => write!(
                 f,
-                "the dead time is not identifiable here: it lies between 0 and {} s; a move {} times as large would tell it from 0",
-                number(*upper_s),
-                number(*times)
+                "{name} is known only to ±{} %: a move of the MV by {} would give ±20 %",
+                n(*percent),
+                n(*mv_move)
+            ),
+            Self::DeadTimeUnknown { upper_s, mv_move } => write!(
+                f,
+                "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
+                n(*upper_s),
+                n(*mv_move)
             ),
             Self::TimeConstantLong { time_constant_s, span_s } => write!(
                 f,
                 "T = {} s is longer than the stretch ({} s): only the ratio K/T is known, record longer",
-                number(*time_constant_s),
-                number(*span_s)
+                n(*time_constant_s),
+                n(*span_s)
             ),
             Self::TimeConstantShort { time_constant_s, sample_time_s } => write!(
                 f,
                 "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
-                number(*time_constant_s),
-                number(*sample_time_s)
+                n(*time_constant_s),
+                n(*sample_time_s)
             ),
             Self::ResolutionLimited { resolution, levels } => write!(
                 f,
                 "resolution, not noise, limits the gain: the PV moves in steps of {} and the whole movement is {} of them; the intervals are too optimistic",
-                number(*resolution),
-                number(*levels)
+                n(*resolution),
+                n(*levels)
             ),
-            Self::ResidualsCorrelated { correlation } => write!(
+            Self::ResidualsCorrelated { correlation, rows } => write!(
                 f,
-                "what the model leaves over is not noise (neighbours correlate by {}): the true intervals are wider than those given",
-                number(*correlation)
+                "what the model leaves over is not white (neighbours correlate by {}): the intervals count {} rows as one",
+                n(*correlation),
+                n(*rows)
             ),
+            Self::ResidualsFollowInput { correlation, lag } => write!(
+                f,
+                "what the model leaves over still follows the MV (correlation {} after {lag} rows): the process has more in it than this structure",
+                n(*correlation)
+            ),
+            Self::Drift { per_hour } => {
+                write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
+            }
             Self::Segments { count } => {
                 write!(f, "the stretch has gaps: fitted as {count} segments, each with its own start")
             }
             Self::StartsAtRest { mv_before } => write!(
                 f,
-                "the MV does not move after the first row: the PV was taken to be at rest with the MV at {} before it",
-                number(*mv_before)
+                "the PV was taken to be at rest ahead of the first move, with the MV at {}",
+                n(*mv_before)
             ),
         }
     }
@@ -137,44 +211,67 @@ impl Explain for FitVerdict {
     fn key(&self) -> &'static str {
         match self {
             Self::Good { .. } => "verdict.good",
+            Self::NoExcitation { .. } => "verdict.no_excitation",
+            Self::Disturbed { .. } => "verdict.disturbed",
+            Self::DisturbanceUnknown { .. } => "verdict.disturbance_unknown",
             Self::Poor { .. } => "verdict.poor",
             Self::GainUncertain { .. } => "verdict.gain_uncertain",
+            Self::ParameterUncertain { .. } => "verdict.parameter_uncertain",
             Self::DeadTimeUnknown { .. } => "verdict.dead_time_unknown",
             Self::TimeConstantLong { .. } => "verdict.time_constant_long",
             Self::TimeConstantShort { .. } => "verdict.time_constant_short",
             Self::ResolutionLimited { .. } => "verdict.resolution_limited",
             Self::ResidualsCorrelated { .. } => "verdict.residuals_correlated",
+            Self::ResidualsFollowInput { .. } => "verdict.residuals_follow_input",
+            Self::Drift { .. } => "verdict.drift",
             Self::Segments { .. } => "verdict.segments",
             Self::StartsAtRest { .. } => "verdict.starts_at_rest",
         }
     }
 
     fn args(&self) -> Vec<(&'static str, String)> {
-        match *self {
-            Self::Good { fit_percent, gain_percent, time_constant_percent } => vec![
-                ("fit_percent", number(fit_percent)),
-                ("gain_percent", number(gain_percent)),
-                ("time_constant_percent", number(time_constant_percent)),
+        let n = |name: &'static str, value: &f64| (name, number(*value));
+        match self {
+            Self::Good { fit_percent, gain, gain_percent } => vec![
+                n("fit_percent", fit_percent),
+                ("gain", (*gain).to_owned()),
+                n("gain_percent", gain_percent),
             ],
-            Self::Poor { fit_percent } => vec![("fit_percent", number(fit_percent))],
-            Self::GainUncertain { percent, times } => {
-                vec![("percent", number(percent)), ("times", number(times))]
+            Self::NoExcitation { mv_name, explained_percent } => {
+                vec![("mv_name", mv_name.clone()), n("explained_percent", explained_percent)]
             }
-            Self::DeadTimeUnknown { upper_s, times } => {
-                vec![("upper_s", number(upper_s)), ("times", number(times))]
+            Self::Disturbed { fit_percent, explained_percent } => {
+                vec![n("fit_percent", fit_percent), n("explained_percent", explained_percent)]
+            }
+            Self::DisturbanceUnknown { name } => vec![("name", name.clone())],
+            Self::Poor { fit_percent } => vec![n("fit_percent", fit_percent)],
+            Self::GainUncertain { percent, mv_move, mv_moved } => {
+                vec![n("percent", percent), n("mv_move", mv_move), n("mv_moved", mv_moved)]
+            }
+            Self::ParameterUncertain { name, percent, mv_move } => {
+                vec![("name", (*name).to_owned()), n("percent", percent), n("mv_move", mv_move)]
+            }
+            Self::DeadTimeUnknown { upper_s, mv_move } => {
+                vec![n("upper_s", upper_s), n("mv_move", mv_move)]
             }
             Self::TimeConstantLong { time_constant_s, span_s } => {
-                vec![("time_constant_s", number(time_constant_s)), ("span_s", number(span_s))]
+                vec![n("time_constant_s", time_constant_s), n("span_s", span_s)]
             }
             Self::TimeConstantShort { time_constant_s, sample_time_s } => {
-                vec![("time_constant_s", number(time_constant_s)), ("sample_time_s", number(sample_time_s))]
+                vec![n("time_constant_s", time_constant_s), n("sample_time_s", sample_time_s)]
             }
             Self::ResolutionLimited { resolution, levels } => {
-                vec![("resolution", number(resolution)), ("levels", number(levels))]
+                vec![n("resolution", resolution), n("levels", levels)]
             }
-            Self::ResidualsCorrelated { correlation } => vec![("correlation", number(correlation))],
+            Self::ResidualsCorrelated { correlation, rows } => {
+                vec![n("correlation", correlation), n("rows", rows)]
+            }
+            Self::ResidualsFollowInput { correlation, lag } => {
+                vec![n("correlation", correlation), ("lag", lag.to_string())]
+            }
+            Self::Drift { per_hour } => vec![n("per_hour", per_hour)],
             Self::Segments { count } => vec![("count", count.to_string())],
-            Self::StartsAtRest { mv_before } => vec![("mv_before", number(mv_before))],
+            Self::StartsAtRest { mv_before } => vec![n("mv_before", mv_before)],
         }
     }
 }
@@ -183,21 +280,36 @@ impl FitVerdict {
     /// Whether it speaks against using the model.
     #[must_use]
     pub fn is_objection(&self) -> bool {
-        !matches!(self, Self::Good { .. } | Self::Segments { .. } | Self::StartsAtRest { .. })
+        !matches!(
+            self,
+            Self::Good { .. } | Self::Segments { .. } | Self::StartsAtRest { .. } | Self::Drift { .. }
+        )
+    }
+
+    /// Whether it says that the stretch cannot tell a model at all.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        matches!(self, Self::NoExcitation { .. } | Self::Disturbed { .. })
     }
 
     /// One value of every variant, for the test that compares sentences and translations.
     #[must_use]
     pub fn samples() -> Vec<Self> {
         vec![
-            Self::Good { fit_percent: 97.4, gain_percent: 1.2, time_constant_percent: 2.5 },
+            Self::Good { fit_percent: 97.4, gain: "K", gain_percent: 1.2 },
+            Self::NoExcitation { mv_name: "FIC101.MV".to_owned(), explained_percent: 98.5 },
+            Self::Disturbed { fit_percent: 41.0, explained_percent: 92.0 },
+            Self::DisturbanceUnknown { name: "feed".to_owned() },
             Self::Poor { fit_percent: 12.0 },
-            Self::GainUncertain { percent: 40.0, times: 4.0 },
-            Self::DeadTimeUnknown { upper_s: 3.5, times: 2.0 },
+            Self::GainUncertain { percent: 40.0, mv_move: 4.0, mv_moved: 1.0 },
+            Self::ParameterUncertain { name: "T2", percent: 80.0, mv_move: 4.0 },
+            Self::DeadTimeUnknown { upper_s: 3.5, mv_move: 2.0 },
             Self::TimeConstantLong { time_constant_s: 900.0, span_s: 300.0 },
             Self::TimeConstantShort { time_constant_s: 0.01, sample_time_s: 0.2 },
             Self::ResolutionLimited { resolution: 0.35, levels: 4.5 },
-            Self::ResidualsCorrelated { correlation: 0.82 },
+            Self::ResidualsCorrelated { correlation: 0.82, rows: 10.0 },
+            Self::ResidualsFollowInput { correlation: 0.31, lag: 4 },
+            Self::Drift { per_hour: -0.4 },
             Self::Segments { count: 3 },
             Self::StartsAtRest { mv_before: 0.0 },
         ]

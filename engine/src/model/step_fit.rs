@@ -64,7 +64,7 @@ pub fn fit_step_response(process: &ZeroPoleGain, order: ReducedOrder) -> Result<
                 initial_state: InitialState::Rest,
                 ..FitOptions::default()
             };
-            let fit = fit_fopdt(&FitProblem { time_s: &time_s, pv: &y, mv: &u, options })?;
+            let fit = fit_fopdt(&FitProblem { options, ..FitProblem::new(&time_s, &y, &u) })?;
             let model = ProcessModel::Fopdt(fit.model);
             Ok(StepFit { model, fit_percent: fit.fit_percent, mse: fit.mse })
         }

@@ -151,6 +151,7 @@ fn transfer(ui: &mut egui::Ui, channel: &Channel, actions: &mut Vec<Action>) {
                     model: model.clone(),
                     origin: ModelOrigin::Typed,
                     fit: None,
+                    study: None,
                     rows: None,
                     pv_unit: "cm".to_owned(),
                     mv_unit: channel.input_unit.clone(),

@@ -1,0 +1,227 @@
+//! `vasos identify`: a process model from a log.
+
+mod answer;
+
+use std::path::{Path, PathBuf};
+
+use vasos_engine::identify::{
+    Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, Structure, StudyOptions, study_loop,
+};
+use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
+use vasos_io::log::{ImportOptions, ImportedLog, import_log};
+
+use super::{Answer, Refusal};
+
+/// Arguments of `vasos identify`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  vasos identify step.csv --json
+  vasos identify step.csv --pv h2_cm --mv u_v --from 100 --to 900
+  vasos identify step.csv --pv T1 --mv '0.5*(u1+u2)' --mv-before 0
+  vasos identify loop.csv --structure sopdt --disturbance feed --drift linear
+  vasos identify loop.csv --mv u0+du --mv-min 0 --mv-max 60
+Columns that are not named are proposed from their names and behaviour. COL is a name or an expression of names.
+With a setpoint and an automatic mode the gains of the controller at work are read from the log as well.
+Exit status 1: the log can be read, but no model can be told from it.")]
+pub struct Arguments {
+    /// Log file: CSV, TSV or the like.
+    log: PathBuf,
+    /// Process variable.
+    #[arg(long, value_name = "COL")]
+    pv: Option<String>,
+    /// Manipulated variable.
+    #[arg(long, value_name = "COL")]
+    mv: Option<String>,
+    /// Setpoint, for the controller's gains.
+    #[arg(long, value_name = "COL")]
+    sp: Option<String>,
+    /// Mode of the controller.
+    #[arg(long, value_name = "COL")]
+    mode: Option<String>,
+    /// Measured disturbance: another input of the PV; may be given several times.
+    #[arg(long, value_name = "COL")]
+    disturbance: Vec<String>,
+    /// Time column, where the proposal is wrong.
+    #[arg(long, value_name = "COL")]
+    time: Option<String>,
+    /// Sample time in seconds, for a log without a time column.
+    #[arg(long, value_name = "S")]
+    sample_time: Option<f64>,
+    /// Start of the stretch, in seconds since the first row.
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    from: Option<f64>,
+    /// End of the stretch, in seconds since the first row.
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    to: Option<f64>,
+    /// MV before the first row, for a log that starts at the step.
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    mv_before: Option<f64>,
+    /// Lower limit of the MV, for a log that holds it ahead of its limits.
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    mv_min: Option<f64>,
+    /// Upper limit of the MV, for a log that holds it ahead of its limits.
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    mv_max: Option<f64>,
+    /// auto, fopdt, ipdt, sopdt or `sopdt_zero`; auto fits all and chooses.
+    #[arg(long, default_value = "auto")]
+    structure: String,
+    /// none, linear or auto: a straight drift of the PV that follows no input.
+    #[arg(long, default_value = "auto")]
+    drift: String,
+    /// Takes every row as it is: leaves out no spike or frozen stretch, looks for no limit of the MV.
+    #[arg(long)]
+    as_is: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The columns in use, as named by the user or proposed.
+struct Chosen {
+    time: Option<String>,
+    pv: String,
+    mv: String,
+    sp: Option<String>,
+    mode: Option<String>,
+    disturbances: Vec<String>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
+    let options = study_options(arguments)?;
+    let drift = drift(&arguments.drift)?;
+    let log = import(arguments)?;
+    let chosen = choose(arguments, &log)?;
+    let stretch = Stretch::of(arguments, &log.table, &chosen)?;
+    let fit_options = FitOptions {
+        mv_before: arguments.mv_before,
+        drift,
+        pv_name: chosen.pv.clone(),
+        mv_name: chosen.mv.clone(),
+        first_row: stretch.first_row,
+        ..FitOptions::default()
+    };
+    let rows = &stretch.rows;
+    let mut problem = FitProblem::new(&rows.time_s, &rows.columns[0], &rows.columns[1]);
+    problem.options = fit_options;
+    let others = chosen.disturbances.iter().zip(&rows.columns[2..]);
+    problem.disturbances = others.map(|(name, values)| Disturbance { name: name.clone(), values }).collect();
+    let record = LoopRecord { problem, sp: stretch.sp.as_deref(), mode: stretch.mode.as_deref() };
+    let study = study_loop(&record, &options).map_err(Refusal::of)?;
+    if let Err(error) = &study.choice
+        && !matches!(error, FitError::NothingToFit { .. })
+    {
+        return Err(Refusal::of(error));
+    }
+    let mut warnings = Vec::new();
+    if !rows.left_out.is_empty() {
+        warnings.push(format!("{} rows without a value were left out", rows.left_out.len()));
+    }
+    Ok(answer::of(arguments.json, &chosen, &study, &log, warnings))
+}
+
+fn study_options(arguments: &Arguments) -> Result<StudyOptions, Refusal> {
+    let structure = match arguments.structure.as_str() {
+        "auto" => None,
+        name => Some(Structure::from_key(name).ok_or_else(|| {
+            let known: Vec<&str> = Structure::ALL.iter().map(|s| s.key()).collect();
+            Refusal(format!("there is no structure '{name}': choose auto or one of {}", known.join(", ")))
+        })?),
+    };
+    let mv_limits = match (arguments.mv_min, arguments.mv_max) {
+        (None, None) => None,
+        (low, high) => {
+            let limits = [low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)];
+            if limits[0].is_nan() || limits[1].is_nan() || limits[0] >= limits[1] {
+                return Err(Refusal(format!("--mv-min {} must lie below --mv-max {}", limits[0], limits[1])));
+            }
+            Some(limits)
+        }
+    };
+    Ok(StudyOptions { structure, mv_limits, as_is: arguments.as_is })
+}
+
+fn drift(name: &str) -> Result<Drift, Refusal> {
+    match name {
+        "none" => Ok(Drift::None),
+        "linear" => Ok(Drift::Linear),
+        "auto" => Ok(Drift::Auto),
+        _ => Err(Refusal(format!("there is no drift '{name}': choose none, linear or auto"))),
+    }
+}
+
+fn import(arguments: &Arguments) -> Result<ImportedLog, Refusal> {
+    let path: &Path = &arguments.log;
+    let bytes = std::fs::read(path)
+        .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let options = ImportOptions { sample_time_s: arguments.sample_time, time_column: arguments.time.clone() };
+    import_log(&name, &bytes, &options).map_err(|error| Refusal(format!("{}: {error}", path.display())))
+}
+
+fn choose(arguments: &Arguments, log: &ImportedLog) -> Result<Chosen, Refusal> {
+    let roles = &log.report.roles;
+    let pick = |given: &Option<String>, proposed: &Option<String>, option: &str| {
+        given.clone().or_else(|| proposed.clone()).ok_or_else(|| {
+            let columns = names(&log.table);
+            Refusal(format!(
+                "no column looks like the {option}: name it with --{option}; there are {columns}"
+            ))
+        })
+    };
+    Ok(Chosen {
+        time: log.report.time_column.clone(),
+        pv: pick(&arguments.pv, &roles.pv, "pv")?,
+        mv: pick(&arguments.mv, &roles.mv, "mv")?,
+        sp: arguments.sp.clone().or_else(|| roles.sp.clone()),
+        mode: arguments.mode.clone().or_else(|| roles.mode.clone()),
+        disturbances: arguments.disturbance.clone(),
+    })
+}
+
+fn names(table: &LogTable) -> String {
+    table.columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ")
+}
+
+/// The rows of a fit.
+struct Stretch {
+    /// PV, MV and the disturbances.
+    rows: CompleteRows,
+    sp: Option<Vec<f64>>,
+    mode: Option<Vec<f64>>,
+    /// Line of the file the first row came from.
+    first_row: usize,
+}
+
+impl Stretch {
+    fn of(arguments: &Arguments, table: &LogTable, chosen: &Chosen) -> Result<Self, Refusal> {
+        let column = |name: &String| derived_column(table, name).map_err(Refusal::of);
+        let mut columns = vec![column(&chosen.pv)?, column(&chosen.mv)?];
+        for name in &chosen.disturbances {
+            columns.push(column(name)?);
+        }
+        let (from_s, to_s) = (arguments.from.unwrap_or(0.0), arguments.to.unwrap_or(f64::INFINITY));
+        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let rows = table.complete(&slices, from_s, to_s);
+        let inside = table.time_s.iter().enumerate().filter(|(_, t)| (from_s..=to_s).contains(*t));
+        let taken: Vec<usize> =
+            inside.map(|(row, _)| row).filter(|row| rows.left_out.binary_search(row).is_err()).collect();
+        // A setpoint or mode that is missing here and there holds its last value.
+        let held = |name: &Option<String>| -> Result<Option<Vec<f64>>, Refusal> {
+            let Some(name) = name else { return Ok(None) };
+            let values = column(name)?;
+            let mut last = taken.iter().map(|&row| values[row]).find(|v| v.is_finite());
+            let filled = taken.iter().map(|&row| {
+                last = Some(values[row]).filter(|v| v.is_finite()).or(last);
+                last
+            });
+            Ok(filled.collect::<Option<Vec<f64>>>())
+        };
+        Ok(Self {
+            sp: held(&chosen.sp)?,
+            mode: held(&chosen.mode)?,
+            first_row: taken.first().and_then(|&row| table.lines.get(row)).map_or(1, |line| *line as usize),
+            rows,
+        })
+    }
+}

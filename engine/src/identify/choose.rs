@@ -1,0 +1,102 @@
+//! Which structure a stretch speaks for.
+
+use super::fit_structure::{fit_on, with_drift_where_due};
+use super::model_fit::ModelFit;
+use super::output_error::Near;
+use super::problem::{Drift, FitProblem};
+use super::{FitError, FitVerdict, Structure};
+
+/// Several structures on one stretch, best first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// Fits with their criterion, best first; never empty.
+    pub fits: Vec<ModelFit>,
+    /// Schwarz's criterion of each fit, n ln(RSS/N) + p ln n with n independent rows, less the smallest.
+    pub criterion: Vec<f64>,
+}
+
+impl Choice {
+    /// A choice of one.
+    #[must_use]
+    pub fn of_one(fit: ModelFit) -> Self {
+        Self { fits: vec![fit], criterion: vec![0.0] }
+    }
+
+    /// Says of every fit that the stretch cannot tell a model: nothing else about it matters then.
+    pub(super) fn refuse(&mut self, verdict: &FitVerdict) {
+        for fit in &mut self.fits {
+            fit.verdicts = vec![verdict.clone()];
+        }
+    }
+
+    /// The fit chosen.
+    #[must_use]
+    pub fn chosen(&self) -> &ModelFit {
+        &self.fits[0]
+    }
+
+    /// The next best, where another structure could be fitted.
+    #[must_use]
+    pub fn runner_up(&self) -> Option<&ModelFit> {
+        self.fits.get(1)
+    }
+}
+
+/// Fits all structures and puts the one first that Schwarz's criterion prefers.
+///
+/// The criterion counts independent rows only, n = N/(1 + 2 Σ ρ) of the best fit's residuals: rows that repeat each
+/// other's noise would otherwise speak for ever more parameters. A structure without an interval for all its
+/// parameters, with a second time constant or a zero whose interval holds 0, or with a time constant beyond twice the
+/// stretch, comes after those without such a flaw.
+///
+/// # Errors
+/// [`FitError`] as [`super::fit_model`], where no structure can be fitted.
+///
+/// Source: Schwarz, Annals of Statistics 6 (1978) 461; Ljung, System Identification, 2nd ed., 16.4.
+pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
+    let stretch = problem.stretch()?;
+    let drift = problem.options.drift == Drift::Linear;
+    let mut fits: Vec<ModelFit> = Vec::new();
+    let mut first_error = None;
+    // First order first: its dynamics start the others.
+    for structure in [Structure::Fopdt, Structure::Ipdt, Structure::Sopdt, Structure::SopdtZero] {
+        let point = |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
+        let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
+        let near = Near { first: point(Structure::Fopdt), same };
+        match fit_on(problem, &stretch, structure, drift, &near) {
+            Ok(fit) => fits.push(fit),
+            Err(error) => first_error = first_error.or(Some(error)),
+        }
+    }
+    let Some(least) = fits.iter().map(|f| f.mse).min_by(f64::total_cmp) else {
+        return Err(first_error.unwrap_or(FitError::TooFewSamples { rows: stretch.len(), needed: 0 }));
+    };
+    let best = fits.iter().find(|f| f.mse == least).map_or(1.0, |f| f.tests.rows_per_independent);
+    let n = (fits[0].rows as f64 / best).max(10.0);
+    // Below this the rows are explained to rounding and the criterion would weigh digits.
+    let floor =
+        1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
+    let criterion =
+        |f: &ModelFit| n * f.mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
+    let span_s = stretch.span_s();
+    let mut order: Vec<(bool, f64, ModelFit)> =
+        fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
+    order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let smallest = order.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
+    let criterion = order.iter().map(|o| o.1 - smallest).collect();
+    let mut fits: Vec<ModelFit> = order.into_iter().map(|o| o.2).collect();
+    if problem.options.drift == Drift::Auto && fits[0].structure != Structure::Ipdt {
+        let plain = fits[0].clone();
+        fits[0] = with_drift_where_due(problem, &stretch, plain);
+    }
+    Ok(Choice { fits, criterion })
+}
+
+/// Whether a parameter that sets the structure apart from a simpler one cannot be told from nothing.
+fn is_flawed(fit: &ModelFit, span_s: f64) -> bool {
+    let unknown = fit.parameters.iter().any(|p| !p.standard_error.is_finite());
+    let nothing =
+        |name: &str| fit.parameter(name).is_some_and(|p| p.interval_95[0] <= 0.0 && p.interval_95[1] >= 0.0);
+    let long = fit.parameter("T_s").is_some_and(|t| t.value > 2.0 * span_s);
+    unknown || nothing("T2_s") || nothing("Tz_s") || long
+}

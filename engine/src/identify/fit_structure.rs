@@ -1,0 +1,230 @@
+//! Fits one structure by output error and reports on it.
+
+use super::fopdt::Interval;
+use super::judge;
+use super::model_fit::{DisturbanceFit, ModelFit};
+use super::output_error::{
+    Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, evaluate, search,
+};
+use super::parameters::Coordinates;
+use super::problem::{Drift, FitProblem, Stretch};
+use super::residual_tests::ResidualTests;
+use super::statistics::student_95;
+use super::{FitError, Structure, fit_fopdt};
+
+/// Fits one structure to a stretch by output error.
+///
+/// y(t) = bias + drift t + G u + Σ Gj dj + free state: exact for inputs held between arbitrary stamps, dead times
+/// continuous, a free state for each segment. Drift is fitted where `options.drift` asks for it; an integrating model
+/// always has it, as the MV at which its PV stands still. Measured disturbances are first order, or integrating with
+/// the main model. Intervals are Student's; where the residuals are not white, the covariance is multiplied by the
+/// number of rows that say as much as one independent row.
+///
+/// # Errors
+/// [`FitError`] names the column and the row of what is wrong with the data.
+///
+/// Source: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; Ljung, System Identification, 2nd ed., 7.2–7.4, 9.3.
+pub fn fit_model(problem: &FitProblem, structure: Structure) -> Result<ModelFit, FitError> {
+    let stretch = problem.stretch()?;
+    let with = problem.options.drift == Drift::Linear;
+    let plain = fit_on(problem, &stretch, structure, with, &Near::default())?;
+    if problem.options.drift != Drift::Auto || structure == Structure::Ipdt {
+        return Ok(plain);
+    }
+    Ok(with_drift_where_due(problem, &stretch, plain))
+}
+
+/// Adds a drift where it explains far more than its own unknown would by chance.
+pub(super) fn with_drift_where_due(problem: &FitProblem, stretch: &Stretch, plain: ModelFit) -> ModelFit {
+    /// Schwarz's criterion must fall by this much: "very strong" evidence (Kass & Raftery, JASA 90 (1995) 773).
+    const VERY_STRONG: f64 = 10.0;
+    // Residuals without a trend leave a drift nothing to explain.
+    if plain.fit_percent > 99.9 || plain.tests.is_white() || !tells_drift(stretch, &plain) {
+        return plain;
+    }
+    let near = Near { same: Some(plain.coordinates.point()), ..Near::default() };
+    let Ok(drifting) = fit_on(problem, stretch, plain.structure, true, &near) else { return plain };
+    let independent = plain.rows as f64 / drifting.tests.rows_per_independent;
+    let gained = independent * (plain.mse / drifting.mse).ln() - independent.max(2.0).ln();
+    let told = drifting.drift.is_some_and(|(_, [low, high])| low > 0.0 || high < 0.0);
+    if gained > VERY_STRONG && told { drifting } else { plain }
+}
+
+/// A drift and the end of a slow response look alike: they are told apart where the MV moves more than once and the
+/// record is long for the dynamics.
+fn tells_drift(stretch: &Stretch, fit: &ModelFit) -> bool {
+    const TIME_CONSTANTS: f64 = 6.0;
+    let moves = stretch.u.windows(2).filter(|w| w[0] != w[1]).take(2).count();
+    let slow_s: f64 = ["T_s", "T2_s", "L_s"].iter().filter_map(|n| fit.parameter(n)).map(|p| p.value).sum();
+    moves > 1 && stretch.span_s() > TIME_CONSTANTS * slow_s
+}
+
+/// Fits a structure with or without drift; `near` are points of the main channel already found.
+pub(super) fn fit_on(
+    problem: &FitProblem,
+    stretch: &Stretch,
+    structure: Structure,
+    drift: bool,
+    near: &Near,
+) -> Result<ModelFit, FitError> {
+    let shape = shape_of(stretch, structure, drift);
+    let nothing = || FitError::NothingToFit {
+        pv_name: problem.options.pv_name.clone(),
+        mv_name: problem.options.mv_name.clone(),
+    };
+    let mut work = Work::default();
+    let plain =
+        structure == Structure::Fopdt && !drift && stretch.keep.is_none() && problem.disturbances.is_empty();
+    let mut dead_time_interval = None;
+    let found = if plain {
+        let fit = fit_fopdt(problem)?;
+        work = Work { passes: fit.passes + 1, thinned: fit.thinned_passes };
+        dead_time_interval = Some(fit.interval_95.dead_time_s);
+        let point =
+            Point { time_s: fit.model.time_constant_s, zeta: 1.0, dead_time_s: fit.model.dead_time_s };
+        // Residuals against the short cut's answer keep the digits that the inner products would square away.
+        let mut reference = Linear::zero(&shape, stretch);
+        reference.shared = vec![fit.bias + fit.model.gain * stretch.u_ref - stretch.y_ref, fit.model.gain];
+        evaluate(stretch, &shape, vec![point], &reference)
+    } else {
+        search(stretch, &shape, near, &mut work)
+    };
+    let found = found.ok_or_else(nothing)?;
+    let mut fit = report(problem, stretch, structure, &shape, &found).ok_or_else(nothing)?;
+    if let Some(interval) = dead_time_interval
+        && fit.tests.rows_per_independent <= 1.0
+        && let Some(l) = fit.parameters.iter_mut().find(|p| p.name == "L_s")
+    {
+        l.interval_95 = interval;
+    }
+    (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
+    fit.verdicts = judge::of_model(&fit, stretch, problem);
+    Ok(fit)
+}
+
+fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
+    let (main, other) = match structure {
+        Structure::Fopdt => (Order::First, Order::First),
+        Structure::Ipdt => (Order::Integrator, Order::Integrator),
+        Structure::Sopdt => (Order::Second { zero: false }, Order::First),
+        Structure::SopdtZero => (Order::Second { zero: true }, Order::First),
+    };
+    let mut channels = vec![main];
+    channels.extend(stretch.others.iter().map(|_| other));
+    Shape::new(channels, drift, stretch.free)
+}
+
+fn report(
+    problem: &FitProblem,
+    stretch: &Stretch,
+    structure: Structure,
+    shape: &Shape,
+    found: &Found,
+) -> Option<ModelFit> {
+    let linear = &found.projected.linear;
+    let (simulated, residuals) = free_run(stretch, shape, found);
+    let rows = stretch.kept();
+    let rss: f64 = residuals.iter().map(|r| r * r).sum();
+    let movement: f64 = stretch
+        .y
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| stretch.counts(*k))
+        .map(|(_, y)| (y - stretch.y_ref).powi(2))
+        .sum();
+    let unknowns = shape.parameters(stretch);
+    let freedom = rows.saturating_sub(unknowns).max(1);
+    let tests = ResidualTests::new(&residuals, &stretch.u);
+    let student = student_95(freedom);
+    let variance = rss / freedom as f64 * tests.rows_per_independent;
+    let whole = found.projected.matrix.inverse();
+    let coordinates = |channel: usize, structure: Structure| {
+        let places = places(shape, channel);
+        let covariance = taken(whole.as_ref(), &places, variance);
+        let first = shape.gains[channel];
+        let gains = if structure == Structure::SopdtZero { 2 } else { 1 };
+        Coordinates::new(structure, &linear.shared[first..first + gains], found.points[channel], covariance)
+    };
+    let main = coordinates(0, structure);
+    let model = main.model_at(&main.values).ok()?;
+    let other = if structure == Structure::Ipdt { Structure::Ipdt } else { Structure::Fopdt };
+    let mut disturbances = Vec::new();
+    for (i, d) in problem.disturbances.iter().enumerate() {
+        let c = coordinates(i + 1, other);
+        let model = c.model_at(&c.values).ok()?;
+        disturbances.push(DisturbanceFit { name: d.name.clone(), model, parameters: c.parameters(student) });
+    }
+    let slope = shape.drift_term().map(|at| {
+        let error = taken(whole.as_ref(), &[at], variance).at(0, 0).sqrt();
+        let value = linear.shared[at];
+        (value, [value - student * error, value + student * error] as Interval)
+    });
+    let gain = linear.shared[shape.gains[0]];
+    let centred: f64 =
+        (0..shape.channels.len()).map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference).sum();
+    let mse = rss / rows as f64;
+    Some(ModelFit {
+        structure,
+        model,
+        parameters: main.parameters(student),
+        disturbances,
+        bias: (!shape.integrating()).then(|| stretch.y_ref + linear.shared[0] - centred),
+        mv_at_rest: slope.filter(|_| shape.integrating()).map(|(s, _)| stretch.u_ref - s / gain),
+        drift: slope.filter(|_| !shape.integrating()),
+        initial_pv: simulated[0],
+        fit_percent: 100.0 * (1.0 - (rss / movement).sqrt()),
+        r2: 1.0 - rss / movement,
+        mse,
+        aic: rows as f64 * mse.max(f64::MIN_POSITIVE).ln() + 2.0 * unknowns as f64,
+        unknowns,
+        rows,
+        segments: stretch.segments.len(),
+        simulated,
+        residuals,
+        tests,
+        verdicts: Vec::new(),
+        passes: 0,
+        thinned_passes: 0,
+        student,
+        coordinates: main,
+    })
+}
+
+/// Places of a channel's gains and unknowns in the matrix of the projected problem.
+fn places(shape: &Shape, channel: usize) -> Vec<usize> {
+    let order = shape.channels[channel];
+    let gains = if order == (Order::Second { zero: true }) { 2 } else { 1 };
+    let first = shape.shared.len() + shape.first_unknown(channel);
+    (shape.gains[channel]..shape.gains[channel] + gains).chain(first..first + order.unknowns()).collect()
+}
+
+/// Part of a covariance, scaled; ∞ where there is none.
+fn taken(whole: Option<&Symmetric>, places: &[usize], variance: f64) -> Symmetric {
+    let mut out = Symmetric::zero(places.len());
+    for (i, &p) in places.iter().enumerate() {
+        for (j, &q) in places.iter().enumerate() {
+            out.set(i, j, whole.map_or(f64::INFINITY, |w| variance * w.at(p, q)));
+        }
+    }
+    out
+}
+
+/// Free run ŷ on every row, and the residuals of those that count.
+fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
+    let mut simulated = Vec::with_capacity(stretch.len());
+    let mut residuals = Vec::with_capacity(stretch.len());
+    let whole = Stretch { keep: None, ..stretch.clone() };
+    blocks(
+        &whole,
+        &shape.without_derivatives(),
+        &found.points,
+        &found.projected.linear,
+        |_, first, columns| {
+            for (i, r) in columns.values[shape.residual][..columns.rows].iter().enumerate() {
+                simulated.push(stretch.y[first + i] - r);
+                residuals.push(if stretch.counts(first + i) { *r } else { 0.0 });
+            }
+        },
+    );
+    (simulated, residuals)
+}

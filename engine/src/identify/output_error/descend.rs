@@ -1,0 +1,259 @@
+//! Gauss–Newton over the non-linear unknowns with Levenberg–Marquardt damping.
+
+use super::fill::grams;
+use super::project::{Projected, Symmetric, project};
+use super::shape::{Linear, Order, Point, Shape};
+use crate::identify::problem::Stretch;
+
+/// A step below this many standard errors changes nothing a reader could see.
+const STEP_IN_STANDARD_ERRORS: [f64; 2] = [1e-4, 1e-3];
+/// Rows above which the larger of the two will do: passes are dear there.
+const MANY_ROWS: usize = 5000;
+/// A step this small is at the end of the digits.
+const STEP_AT_ROUNDING: f64 = 1e-12;
+/// Largest change of ln T, ln τ, ln ζ, L/T in a step.
+const LARGEST_STEP: f64 = 1.5;
+const LARGEST_DAMPING: f64 = 1e7;
+/// Where ζ may lie: a ring below the one never dies in a record, two time constants above the other are one.
+const ZETA: [f64; 2] = [0.01, 30.0];
+
+/// Where the unknowns may lie.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::identify) struct Bounds {
+    pub time_s: [f64; 2],
+    pub dead_time_s: f64,
+}
+
+impl Bounds {
+    /// From a thirtieth of the sample time to a hundred stretches.
+    pub fn of(stretch: &Stretch) -> Self {
+        Self {
+            time_s: [stretch.sample_time_s / 30.0, 100.0 * stretch.span_s()],
+            dead_time_s: 0.9 * stretch.span_s(),
+        }
+    }
+
+    pub fn clip(&self, order: Order, p: Point) -> Point {
+        Point {
+            time_s: match order {
+                Order::Integrator => p.time_s,
+                _ => p.time_s.clamp(self.time_s[0], self.time_s[1]),
+            },
+            zeta: p.zeta.clamp(ZETA[0], ZETA[1]),
+            dead_time_s: p.dead_time_s.clamp(0.0, self.dead_time_s),
+        }
+    }
+}
+
+/// A point of the search with everything its pass gave.
+#[derive(Debug, Clone)]
+pub(in crate::identify) struct Found {
+    pub points: Vec<Point>,
+    pub projected: Projected,
+}
+
+impl Found {
+    pub fn rss(&self) -> f64 {
+        self.projected.rss
+    }
+}
+
+/// One pass.
+pub(in crate::identify) fn evaluate(
+    stretch: &Stretch,
+    shape: &Shape,
+    points: Vec<Point>,
+    reference: &Linear,
+) -> Option<Found> {
+    let grams = grams(stretch, shape, &points, reference);
+    let projected = project(&grams, shape, reference)?;
+    projected.rss.is_finite().then_some(Found { points, projected })
+}
+
+/// Refines a start with at most `passes` passes, which it counts.
+pub(in crate::identify) fn refine(
+    stretch: &Stretch,
+    shape: &Shape,
+    start: &[Point],
+    passes: usize,
+    count: &mut usize,
+) -> Option<Found> {
+    let bounds = Bounds::of(stretch);
+    let clip = |points: &[Point]| -> Vec<Point> {
+        points.iter().zip(&shape.channels).map(|(p, order)| bounds.clip(*order, *p)).collect()
+    };
+    *count += 1;
+    let mut best = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
+    let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
+    let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
+    let mut damping = 1e-6;
+    for _ in 1..passes {
+        let reduced = Reduced::of(&best.projected, &held(shape, &best.points));
+        let step = reduced.step(damping);
+        let target = clip(&moved(shape, &best.points, &step));
+        let taken = difference(shape, &best.points, &target);
+        if reduced.is_small(&taken, best.rss() / spare, tolerance) {
+            break;
+        }
+        *count += 1;
+        match evaluate(stretch, shape, target, &best.projected.linear) {
+            Some(trial) if trial.rss() <= best.rss() => {
+                damping = (damping * 0.1).max(1e-12);
+                best = trial;
+            }
+            _ => damping = (damping * 30.0).max(1e-3),
+        }
+        if damping > LARGEST_DAMPING {
+            break;
+        }
+    }
+    Some(best)
+}
+
+/// For each unknown: which way it may not go.
+fn held(shape: &Shape, points: &[Point]) -> Vec<Side> {
+    let mut out = Vec::with_capacity(shape.unknowns);
+    for (order, p) in shape.channels.iter().zip(points) {
+        if let Order::Second { .. } = order {
+            out.push(Side::None);
+            out.push(if p.zeta >= ZETA[1] {
+                Side::Up
+            } else if p.zeta <= ZETA[0] {
+                Side::Down
+            } else {
+                Side::None
+            });
+        } else if *order == Order::First {
+            out.push(Side::None);
+        }
+        out.push(if p.dead_time_s <= 0.0 { Side::Down } else { Side::None });
+    }
+    out
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    None,
+    Down,
+    Up,
+}
+
+fn moved(shape: &Shape, points: &[Point], step: &[f64]) -> Vec<Point> {
+    let mut k = 0;
+    let mut take = || {
+        k += 1;
+        step[k - 1]
+    };
+    shape
+        .channels
+        .iter()
+        .zip(points)
+        .map(|(order, p)| {
+            let mut q = *p;
+            match order {
+                Order::First => q.time_s *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp(),
+                Order::Integrator => {}
+                Order::Second { .. } => {
+                    q.time_s *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp();
+                    q.zeta *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp();
+                }
+            }
+            q.dead_time_s += take() * p.time_s;
+            q
+        })
+        .collect()
+}
+
+fn difference(shape: &Shape, from: &[Point], to: &[Point]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(shape.unknowns);
+    for ((order, a), b) in shape.channels.iter().zip(from).zip(to) {
+        if *order != Order::Integrator {
+            out.push((b.time_s / a.time_s).ln());
+        }
+        if let Order::Second { .. } = order {
+            out.push((b.zeta / a.zeta).ln());
+        }
+        out.push((b.dead_time_s - a.dead_time_s) / a.time_s);
+    }
+    out
+}
+
+/// Normal equations of the non-linear unknowns alone.
+struct Reduced {
+    h: Symmetric,
+    g: Vec<f64>,
+    held: Vec<Side>,
+}
+
+impl Reduced {
+    fn of(projected: &Projected, held: &[Side]) -> Self {
+        let (lin, n) = (projected.linear_count, held.len());
+        let mut whole = Symmetric::zero(lin + n + 1);
+        for i in 0..lin + n {
+            for j in 0..lin + n {
+                whole.set(i, j, projected.matrix.at(i, j));
+            }
+            whole.set(i, lin + n, projected.rhs[i]);
+            whole.set(lin + n, i, projected.rhs[i]);
+        }
+        let scale: Vec<f64> = (0..=lin + n).map(|i| whole.at(i, i)).collect();
+        whole.eliminate(0..lin, &scale);
+        let mut h = Symmetric::zero(n);
+        for i in 0..n {
+            for j in 0..n {
+                h.set(i, j, whole.at(lin + i, lin + j));
+            }
+        }
+        Self { h, g: (0..n).map(|i| whole.at(lin + i, lin + n)).collect(), held: held.to_vec() }
+    }
+
+    /// Damped step; an unknown at its bound that would leave it stays.
+    fn step(&self, damping: f64) -> Vec<f64> {
+        let n = self.g.len();
+        let mut free: Vec<usize> = (0..n).filter(|&i| self.h.at(i, i) > 0.0).collect();
+        loop {
+            let step = self.solve(damping, &free);
+            let leaving = free.iter().position(|&i| match self.held[i] {
+                Side::None => false,
+                Side::Down => step[i] <= 0.0,
+                Side::Up => step[i] >= 0.0,
+            });
+            match leaving {
+                Some(at) => {
+                    free.remove(at);
+                }
+                None => return step,
+            }
+        }
+    }
+
+    fn solve(&self, damping: f64, free: &[usize]) -> Vec<f64> {
+        let mut step = vec![0.0; self.g.len()];
+        let size = free.len();
+        let mut m = Symmetric::zero(size + 1);
+        for (a, &i) in free.iter().enumerate() {
+            for (b, &j) in free.iter().enumerate() {
+                let value = 0.5 * (self.h.at(i, j) + self.h.at(j, i));
+                m.set(a, b, if a == b { value * (1.0 + damping) } else { value });
+            }
+            m.set(a, size, self.g[i]);
+        }
+        let scale: Vec<f64> = (0..=size).map(|a| m.at(a, a)).collect();
+        let taken = m.eliminate(0..size, &scale);
+        for (a, &i) in free.iter().enumerate() {
+            if taken[a] {
+                step[i] = m.at(a, size) / m.at(a, a);
+            }
+        }
+        step
+    }
+
+    fn is_small(&self, step: &[f64], variance: f64, tolerance: f64) -> bool {
+        step.iter().enumerate().all(|(i, step)| {
+            // √(1/Hii) is the standard error with the others fixed: the smaller, hence safer, of the two.
+            let h = self.h.at(i, i);
+            let error = if h > 0.0 { (variance / h).sqrt() } else { 0.0 };
+            step.abs() <= (tolerance * error).max(STEP_AT_ROUNDING)
+        })
+    }
+}

@@ -1,0 +1,20 @@
+//! Output error for every structure: several inputs, drift, rows left out, free states between gaps.
+//!
+//! y(t) = bias + drift · t + Σ channels + free modes. What enters linearly (bias, drift, gains, zeros, free states) is
+//! solved and projected out of every pass; Gauss–Newton works on the dynamics alone. One pass over the rows gives
+//! residual, gradient and matrix at once as inner products of columns.
+
+mod columns;
+mod descend;
+mod fill;
+mod kernel;
+mod matrix2;
+mod project;
+mod search;
+mod shape;
+
+pub(super) use descend::{Found, evaluate};
+pub(super) use fill::blocks;
+pub(super) use project::Symmetric;
+pub(super) use search::{Near, Work, search};
+pub(super) use shape::{Linear, Order, Point, Shape};

@@ -1,0 +1,362 @@
+//! A stretch of a loop's log, studied as a whole: rows that are no measurements, the process, the controller, the valve.
+//!
+//! [`study_loop`] is what a face calls. It never fits through what it has seen: rows it doesn't trust don't count, an
+//! MV logged ahead of its limits is taken at them, and a stretch in which nothing but feedback moves the MV gets a
+//! reasoned no instead of a model.
+
+mod clip;
+mod condition;
+mod controller;
+mod finding;
+mod stiction;
+
+use std::borrow::Cow;
+
+pub use controller::ControllerFit;
+pub use finding::RecordFinding;
+pub use stiction::Oscillation;
+
+use super::{
+    Choice, FitError, FitOptions, FitProblem, FitVerdict, InitialState, Structure, choose_model, fit_model,
+};
+use crate::analyze::is_closed_loop_stable;
+use crate::model::ProcessModel;
+use condition::{condition, mended, slips};
+
+/// What is asked of a study.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StudyOptions {
+    /// Structure to fit; absent: all, the best first.
+    pub structure: Option<Structure>,
+    /// Limits of the MV, where the log holds it ahead of them.
+    pub mv_limits: Option<[f64; 2]>,
+    /// Takes every row as it is: no row is left out, no limit is looked for.
+    pub as_is: bool,
+}
+
+/// A loop's record: the problem of the fit, with setpoint and mode where the log has them.
+#[derive(Debug, Clone)]
+pub struct LoopRecord<'a> {
+    /// PV, MV, time, disturbances, what is known of them.
+    pub problem: FitProblem<'a>,
+    /// Setpoint, N rows.
+    pub sp: Option<&'a [f64]>,
+    /// Mode as the log codes it, N rows.
+    pub mode: Option<&'a [f64]>,
+}
+
+/// What a stretch of a loop's log says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopStudy {
+    /// Fits of the process, best first, or why there is none.
+    pub choice: Result<Choice, FitError>,
+    /// The controller at work, where one can be seen.
+    pub controller: Option<ControllerFit>,
+    /// Regular oscillation, where there is one.
+    pub oscillation: Option<Oscillation>,
+    /// What else was seen.
+    pub findings: Vec<RecordFinding>,
+}
+
+impl LoopStudy {
+    /// Whether the stretch gives a model.
+    #[must_use]
+    pub fn has_model(&self) -> bool {
+        self.choice.as_ref().is_ok_and(|c| c.chosen().is_usable())
+    }
+}
+
+/// Studies a stretch.
+///
+/// # Errors
+/// [`FitError`] for columns that cannot be read at all (lengths, numbers, time); what only keeps a model from being
+/// fitted is in [`LoopStudy::choice`].
+pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStudy, FitError> {
+    let mut problem = record.problem.clone();
+    problem.check_columns()?;
+    check_length(record)?;
+    let mut findings = Vec::new();
+    let rows = problem.time_s.len();
+    let mut saturated = vec![false; rows];
+    let (mended_mv, mended_sp);
+    let mut record = record.clone();
+    if !options.as_is {
+        let seen = condition(problem.time_s, problem.pv, problem.mv, problem.options.first_row);
+        saturated = seen.saturated;
+        findings = seen.findings;
+        if problem.keep.is_none() && seen.keep.iter().any(|k| !k) {
+            problem.keep = Some(Cow::Owned(seen.keep));
+        }
+        if let Some(mv) = seen.mv {
+            mended_mv = mv;
+            (problem.mv, record.problem.mv) = (&mended_mv, &mended_mv);
+        }
+        if let Some(sp) = record.sp {
+            mended_sp = mended(sp, &slips(sp));
+            record.sp = Some(&mended_sp);
+        }
+    }
+    let clipped;
+    if let Some(limits) = options.mv_limits.or_else(|| clip_limits(&problem, options)) {
+        clipped = problem.mv.iter().map(|u| u.clamp(limits[0], limits[1])).collect::<Vec<f64>>();
+        let beyond = problem.mv.iter().zip(&clipped).filter(|(a, b)| a != b).count();
+        if beyond > 0 {
+            findings.push(RecordFinding::MvBeyondLimits { limits, rows: beyond });
+            for (flag, (a, b)) in saturated.iter_mut().zip(problem.mv.iter().zip(&clipped)) {
+                *flag |= a != b;
+            }
+            problem.mv = &clipped;
+        }
+    }
+    let controller = controller_of(&record, &problem, &saturated, &mut findings);
+    let mut choice = fitted(&problem, options);
+    if starts_at_rest(&problem) {
+        let at_rest = FitOptions { initial_state: InitialState::Rest, ..problem.options.clone() };
+        let rest = fitted(&FitProblem { options: at_rest.clone(), ..problem.clone() }, options);
+        if let (Ok(free), Ok(found)) = (&choice, &rest)
+            && found.chosen().fit_percent > free.chosen().fit_percent - RESTING_PERCENT
+        {
+            problem.options = at_rest;
+            choice = rest;
+        }
+    }
+    if let Ok(choice) = &mut choice {
+        refuse_feedback(&record, &problem, controller.as_ref(), choice);
+    }
+    let earlier = one_row_earlier(problem.mv);
+    if !options.as_is
+        && let Some(better) = answered_in_the_same_row(&problem, &earlier, &choice, options)
+    {
+        choice = Ok(better);
+        findings.push(RecordFinding::MvEarlier);
+    }
+    if let (Ok(choice), Some(controller)) = (&choice, &controller) {
+        of_the_loop(controller, choice, &mut findings);
+    }
+    let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
+    Ok(LoopStudy { choice, controller, oscillation, findings })
+}
+
+fn fitted(problem: &FitProblem, options: &StudyOptions) -> Result<Choice, FitError> {
+    match options.structure {
+        None => choose_model(problem),
+        Some(structure) => fit_model(problem, structure).map(Choice::of_one),
+    }
+}
+
+/// What a start at rest may cost in fit, in points, where the rows ahead of the first move stand still.
+const RESTING_PERCENT: f64 = 10.0;
+
+/// Whether the PV stands still in the rows ahead of the first move of the MV.
+///
+/// With a free start least squares may explain a response that begins soon after the first row as the end of an
+/// earlier motion, and does so with a better fit where the process is a little non-linear. The rows ahead of the move
+/// speak against it.
+fn starts_at_rest(problem: &FitProblem) -> bool {
+    const ROWS: usize = 5;
+    /// Part of the whole movement that counts as standing still.
+    const STILL: f64 = 0.01;
+    let Some(rest) = problem.mv.windows(2).position(|w| w[0] != w[1]).map(|k| k + 1) else { return false };
+    if rest < ROWS
+        || problem.options.initial_state == InitialState::Rest
+        || problem.options.mv_before.is_some()
+    {
+        return false;
+    }
+    let rows = &problem.pv[..rest];
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let range = |values: &[f64]| {
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        high - low
+    };
+    // Ends averaged over a third, against what the scatter of that many rows leaves of a trend.
+    let third = (rest / 3).max(1);
+    let (first, last) = (&rows[..third], &rows[rest - third..]);
+    let middle = mean(rows);
+    let scatter = (rows.iter().map(|y| (y - middle).powi(2)).sum::<f64>() / rest as f64).sqrt();
+    let change = (mean(last) - mean(first)).abs();
+    change <= STILL * range(problem.pv) + 2.0 * scatter * (2.0 / third as f64).sqrt()
+}
+
+fn one_row_earlier(mv: &[f64]) -> Vec<f64> {
+    mv.iter().skip(1).chain(mv.last()).copied().collect()
+}
+
+/// The fit with every MV one row earlier, where the PV answers a move in its own row: then the log writes the MV ahead
+/// of the PV, against the convention of records.
+fn answered_in_the_same_row(
+    problem: &FitProblem,
+    earlier: &[f64],
+    choice: &Result<Choice, FitError>,
+    options: &StudyOptions,
+) -> Option<Choice> {
+    /// Correlation of the residuals with the moves of their own row, in half widths of its band.
+    const BANDS: f64 = 3.0;
+    /// The squared residual must fall to this part.
+    const FALL: f64 = 0.6;
+    let fit = choice.as_ref().ok()?.chosen();
+    if !fit.is_usable() {
+        return None;
+    }
+    let at_once = fit.tests.cross_correlation.first()?.abs() > BANDS * fit.tests.cross_correlation_band;
+    let no_dead_time = fit.parameter("L_s").is_some_and(|l| l.interval_95[0] <= 0.0);
+    if !(at_once && no_dead_time) {
+        return None;
+    }
+    let shifted = FitProblem { mv: earlier, ..problem.clone() };
+    let other = fitted(&shifted, options).ok()?;
+    (other.chosen().mse < FALL * fit.mse && other.chosen().is_usable()).then_some(other)
+}
+
+fn check_length(record: &LoopRecord) -> Result<(), FitError> {
+    let rows = record.problem.time_s.len();
+    for column in [record.sp, record.mode].into_iter().flatten() {
+        if column.len() != rows {
+            return Err(FitError::LengthMismatch {
+                time: rows,
+                pv: record.problem.pv.len(),
+                mv: column.len(),
+                pv_name: record.problem.options.pv_name.clone(),
+                mv_name: "SP or MODE".to_owned(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn clip_limits(problem: &FitProblem, options: &StudyOptions) -> Option<[f64; 2]> {
+    if options.as_is { None } else { clip::limits(problem) }
+}
+
+/// The controller, read in the mode in which it explains the MV best.
+fn controller_of(
+    record: &LoopRecord,
+    problem: &FitProblem,
+    saturated: &[bool],
+    findings: &mut Vec<RecordFinding>,
+) -> Option<ControllerFit> {
+    let rows = problem.time_s.len();
+    let sample_time_s = sample_time(problem.time_s);
+    let keep = |k: usize| problem.keep.as_ref().is_none_or(|keep| keep[k]);
+    let in_mode = |mode: Option<f64>| -> Option<ControllerFit> {
+        let usable: Vec<bool> = (0..rows)
+            .map(|k| {
+                keep(k)
+                    && !saturated[k]
+                    && mode.is_none_or(|m| record.mode.is_some_and(|column| column[k] == m))
+            })
+            .collect();
+        controller::fit_controller(&controller::Columns {
+            time_s: problem.time_s,
+            pv: problem.pv,
+            sp: record.sp,
+            mv: record.problem.mv,
+            usable: &usable,
+            sample_time_s,
+        })
+    };
+    let Some(column) = record.mode else { return in_mode(None) };
+    let mut modes = column.to_vec();
+    modes.sort_by(f64::total_cmp);
+    modes.dedup();
+    if modes.len() > 6 {
+        return in_mode(None);
+    }
+    let found = modes
+        .iter()
+        .filter_map(|&mode| in_mode(Some(mode)).map(|fit| (mode, fit)))
+        .max_by(|a, b| a.1.r2.total_cmp(&b.1.r2));
+    let changes: Vec<usize> = (1..rows).filter(|&k| column[k] != column[k - 1]).collect();
+    if let Some(&first) = changes.first() {
+        findings.push(RecordFinding::ModeChanges {
+            count: changes.len(),
+            at_s: problem.time_s[first],
+            mode: found.as_ref().map_or(column[0], |f| f.0),
+        });
+    }
+    found.map(|f| f.1)
+}
+
+/// Median step of the stamps.
+fn sample_time(time_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
+    if steps.is_empty() {
+        return 1.0;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A stretch in which the MV does nothing but answer the PV shows the controller, not the process.
+fn refuse_feedback(
+    record: &LoopRecord,
+    problem: &FitProblem,
+    controller: Option<&ControllerFit>,
+    choice: &mut Choice,
+) {
+    /// Part of the MV's moves that feedback explains where nothing else moves it.
+    const FEEDBACK: f64 = 0.7;
+    /// A setpoint that moves this seldom leaves disturbances the most of the record.
+    const FEW_MOVES: usize = 5;
+    /// Fit in percent from which a few moves of the setpoint do tell the process.
+    const TOLD_PERCENT: f64 = 75.0;
+    let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK) else { return };
+    let still = record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]));
+    let one_mode = record.mode.is_none_or(|mode| mode.iter().all(|m| *m == mode[0]));
+    let other_excitation = problem.disturbances.iter().any(|d| d.values.iter().any(|v| *v != d.values[0]));
+    if still && one_mode && !other_excitation {
+        choice.refuse(&FitVerdict::NoExcitation {
+            mv_name: problem.options.mv_name.clone(),
+            explained_percent: 100.0 * controller.r2,
+        });
+        return;
+    }
+    let setpoint_moves = record.sp.map_or(0, |sp| sp.windows(2).filter(|w| w[0] != w[1]).count());
+    let fit_percent = choice.chosen().fit_percent;
+    if !still && setpoint_moves < FEW_MOVES && fit_percent < TOLD_PERCENT && one_mode && !other_excitation {
+        choice.refuse(&FitVerdict::Disturbed { fit_percent, explained_percent: 100.0 * controller.r2 });
+    }
+}
+
+/// What model and controller say of each other.
+fn of_the_loop(controller: &ControllerFit, choice: &Choice, findings: &mut Vec<RecordFinding>) {
+    let fit = choice.chosen();
+    if !fit.is_usable() || controller.r2 < 0.5 {
+        return;
+    }
+    let gain = fit.parameters[0].value;
+    let [low, high] = fit.parameters[0].interval_95;
+    // Only a sign beyond doubt is worth the alarm.
+    if low * high > 0.0 && controller.kc_interval_95[0] * controller.kc_interval_95[1] > 0.0 {
+        if gain * controller.kc < 0.0 {
+            findings.push(RecordFinding::WrongSign { kc: controller.kc, gain });
+        } else if let Some(gains) = controller.gains()
+            && !is_closed_loop_stable(&fit.model, &gains)
+        {
+            findings.push(RecordFinding::UnstableTuning { kc: controller.kc });
+        }
+    }
+}
+
+fn oscillation_of(
+    problem: &FitProblem,
+    controller: Option<&ControllerFit>,
+    choice: Option<&Choice>,
+    findings: &mut Vec<RecordFinding>,
+) -> Option<Oscillation> {
+    // An open loop swings with what a hand does: no sign of the valve.
+    controller.filter(|c| c.r2 > 0.3)?;
+    let integrating = choice.is_some_and(|c| matches!(c.chosen().model, ProcessModel::Ipdt(_)));
+    let found = stiction::oscillation(problem.time_s, problem.pv, problem.mv, integrating)?;
+    if found.sticks() {
+        findings.push(RecordFinding::Stiction {
+            index: found.stiction_index,
+            band: found.stiction_band,
+            period_s: found.period_s,
+        });
+    } else if found.regularity > 1.0 {
+        findings.push(RecordFinding::Oscillates { period_s: found.period_s, index: found.stiction_index });
+    }
+    Some(found)
+}
