@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use vasos_engine::excitation::Ending;
 use vasos_engine::plant::FaultKind;
 use vasos_engine::session::{Event, EventKind, RigCommand};
 
@@ -76,6 +77,22 @@ pub fn of_event(event: &Event) -> Entry {
                 (Weight::Note, tr!("event.alarm_over", alarm = words), None)
             }
         }
+        EventKind::ExcitationProgress { tag, progress } => {
+            let phase = tr!(&format!("excitation.phase.{}", progress.phase.key()));
+            let words = if progress.cycle > 0 {
+                tr!("event.excitation_cycle", tag = tag, phase = phase, cycle = progress.cycle)
+            } else {
+                tr!("event.excitation_phase", tag = tag, phase = phase)
+            };
+            (Weight::Note, words, Some(format!("excitation {tag}")))
+        }
+        EventKind::ExcitationEnded(report) => match &report.ending {
+            Ending::Finished => (Weight::Note, tr!("event.excitation_finished", tag = report.tag), None),
+            Ending::Stopped(reason) => {
+                let reason = i18n::say(reason);
+                (Weight::Alarm, tr!("event.excitation_stopped", tag = report.tag, reason = reason), None)
+            }
+        },
         EventKind::SamplesLost { count } => (Weight::Alarm, tr!("event.samples_lost", count = count), None),
         EventKind::EventsLost { count } => (Weight::Alarm, tr!("event.events_lost", count = count), None),
         EventKind::Stopped { reason } => (Weight::Alarm, tr!("event.stopped", reason = reason), None),
@@ -132,6 +149,11 @@ fn done(command: &RigCommand) -> String {
             )
         }
         RigCommand::Seed { seed } => tr!("event.seed", seed = seed),
+        RigCommand::Excite { tag, excitation } => {
+            let signal = tr!(&format!("excitation.signal.{}", excitation.signal.key()));
+            tr!("event.excite", tag = tag, signal = signal)
+        }
+        RigCommand::AbortExcitation { tag } => tr!("event.abort_excitation", tag = tag),
         RigCommand::Fault { tag, fault } => tr!("event.fault", tag = tag, fault = fault_name(fault.kind())),
         RigCommand::Repair { tag, kind: Some(kind) } => {
             tr!("event.repair", tag = tag, fault = fault_name(*kind))

@@ -2,13 +2,15 @@
 //!
 //! A tank network ([`plant`]) is driven by controllers ([`control`]) at the sample time, offline in [`sim`] or
 //! live in a [`session`] whose one worker thread takes commands and gives snapshots, samples and events.
-//! Data from either, or from a log, is fitted by [`identify`]; [`tune`] turns a [`model`] into gains and
-//! [`analyze`] says what they are worth. An [`experiment`] is a prepared run with what must come of it. Nothing here knows a window, a file format or a recorder.
+//! An [`excitation`] moves a running loop so that there is something to tell. Data from a run or from a log is fitted by
+//! [`identify`]; [`tune`] turns a [`model`] into gains and [`analyze`] says what they are worth. An [`experiment`] is a
+//! prepared run with what must come of it. Nothing here knows a window, a file format or a recorder.
 
 pub mod analyze;
 pub mod control;
 pub mod daq;
 pub mod document;
+pub mod excitation;
 pub mod experiment;
 pub mod explain;
 pub mod identify;

@@ -8,6 +8,7 @@ use vasos_app::cli::parse::ParseError;
 use vasos_engine::analyze::MetricsError;
 use vasos_engine::control::{FormError, GainsError};
 use vasos_engine::document::DocumentError;
+use vasos_engine::excitation::{ExcitationError, ExcitationWarning, StopReason};
 use vasos_engine::experiment::{ExperimentError, RunError};
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{FitError, FitVerdict, RecordFinding};
@@ -217,6 +218,9 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("FormError", boxed(FormError::samples())),
         ("ModelError", boxed(ModelError::samples())),
         ("CommandError", boxed(CommandError::samples())),
+        ("ExcitationError", boxed(ExcitationError::samples())),
+        ("StopReason", boxed(StopReason::samples())),
+        ("ExcitationWarning", boxed(ExcitationWarning::samples())),
         ("DocumentError", boxed(DocumentError::samples())),
         ("ScenarioError", boxed(scenario)),
         ("FitError", boxed(FitError::samples())),

@@ -3,11 +3,12 @@
 //! A test binary of its own, since the counting allocator serves the whole program.
 
 use vasos_engine::control::{Action, Clip, Law, LoopOptions, Sends};
+use vasos_engine::excitation::{AtRest, Ending, Excitation, StopReason};
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::RigCommand;
 use vasos_engine::sim::ClosedLoop;
 use vasos_io::rig::{PRESETS, parse_rig, preset};
-use vasos_tests::root;
+use vasos_tests::{root, signals};
 
 #[test]
 fn a_sample_allocates_nothing() {
@@ -56,6 +57,30 @@ fn a_sample_of_any_law_with_every_option_allocates_nothing() {
         }
     });
     assert_eq!((counted.count_total, counted.bytes_total), (0, 0));
+}
+
+/// Every test on a loop, from its first sample to its last: what it needs, it reserves when it is asked for.
+#[test]
+fn a_sample_of_any_test_on_a_loop_allocates_nothing() {
+    for signal in signals() {
+        let network = preset("stad").expect("preset");
+        let mut closed = ClosedLoop::simulated(network, 0, Measurement::DEFAULT, 1).expect("starts");
+        for _ in 0..1000 {
+            closed.step();
+        }
+        let excitation =
+            Box::new(Excitation { at_rest: AtRest::NotNeeded, ..Excitation::new(signal.clone()) });
+        closed.apply(&RigCommand::Excite { tag: "LIC-02".to_owned(), excitation }).expect("begins");
+        let counted = allocation_counter::measure(|| {
+            while closed.excitation_progress().is_some() {
+                closed.step();
+            }
+        });
+        assert_eq!((counted.count_total, counted.bytes_total), (0, 0), "{signal:?}");
+        let report = closed.ended_excitations().next().expect("ended");
+        let unheard = matches!(report.ending, Ending::Stopped(StopReason::NoOscillation { .. }));
+        assert!(report.ending == Ending::Finished || unheard, "{signal:?}: {:?}", report.ending);
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ use vasos_engine::control::{
     PidTuning, SchedulePoint, Sends, SetpointPath, SmithModel,
 };
 use vasos_engine::document::{Document, DocumentCommand};
+use vasos_engine::excitation::{AtRest, Excitation, Relay, Signal, StepEnd, UltimateGain};
 use vasos_engine::plant::spec::ValveLaw;
 use vasos_engine::plant::{Measurement, Network, RigSpec};
 use vasos_engine::session::{
@@ -424,7 +425,12 @@ fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> Session
     };
     let loops = ["LIC-02", "LIC-03", "LIC-01", "BA01", "", "TQ1"];
     let gains = PidGains { kc: value, ti_s: 20.0 * value, td_s: value / 9.0, n: 10.0 };
-    match rng.random_range(0..42) {
+    match rng.random_range(0..46) {
+        42..=44 => {
+            let excitation = Box::new(random_test(rng, value));
+            SessionCommand::Rig(RigCommand::Excite { tag: pick(rng, &loops), excitation })
+        }
+        45 => SessionCommand::Rig(RigCommand::AbortExcitation { tag: pick(rng, &loops) }),
         36..=38 => {
             SessionCommand::Rig(RigCommand::Law { tag: pick(rng, &loops), law: random_law(rng, value) })
         }
@@ -477,6 +483,19 @@ fn random_command(rng: &mut impl Rng, rigs: &[Rig], seen: &Arc<Seen>) -> Session
         30 => SessionCommand::Rig(RigCommand::Seed { seed: rng.random() }),
         _ => SessionCommand::Run,
     }
+}
+
+/// Some tests on a loop; `value` may be odd.
+fn random_test(rng: &mut impl Rng, value: f64) -> Excitation {
+    let signal = match rng.random_range(0..5) {
+        0 => Signal::Relay(Relay::new(value / 30.0)),
+        1 => Signal::Step { size: value / 50.0, rest_share: 0.05, end: StepEnd::Stay },
+        2 => Signal::SetpointStep { size: value / 10.0, rest_share: 0.05, end: StepEnd::Stay },
+        3 => Signal::Prbs { amplitude: value / 50.0, clock_s: 3.0, register: 4, periods: 1 },
+        _ => Signal::UltimateGain(UltimateGain::new(value, 0.2)),
+    };
+    let at_rest = AtRest::NotNeeded;
+    Excitation { at_rest, listen_s: 3.0, budget_s: 60.0, ..Excitation::new(signal) }
 }
 
 fn random_law(rng: &mut impl Rng, value: f64) -> Law {

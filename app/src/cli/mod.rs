@@ -7,6 +7,7 @@ mod analyze;
 mod compare;
 mod controller;
 mod ensemble;
+mod excite;
 mod experiment;
 mod identify;
 mod json;
@@ -32,6 +33,7 @@ Examples:
   vasos step.csv                             open it with a log
   vasos simulate run.toml -o run.csv
   vasos model stad --at LIC-02=19
+  vasos excite stad --loop LIC-02 --relay 0.3
   vasos compare run.toml --recording run.csv --column h2_cm
   vasos identify step.csv --pv h2 --mv u --json
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
@@ -57,6 +59,8 @@ pub enum Command {
     Simulate(simulate::Arguments),
     /// Linearise a rig at rest: state space, poles, zeros, transfer functions, gains, low-order models.
     Model(model::Arguments),
+    /// Run a test on a loop of a simulated rig (step, relay, binary sequence, sines and others), and fit its model.
+    Excite(Box<excite::Arguments>),
     /// Run models side by side on one input, against a recording.
     Compare(compare::Arguments),
     /// Fit a process model to a log.
@@ -150,6 +154,7 @@ pub fn run(cli: Cli) -> CliOutcome {
     let answered = match &command {
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Model(arguments) => model::run(arguments),
+        Command::Excite(arguments) => excite::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use vasos_engine::analyze::{Excitation, Metrics};
+use vasos_engine::excitation::{Ending, ExcitationReport};
 use vasos_engine::plant::Network;
 use vasos_engine::session::{Event, EventKind};
 use vasos_engine::signal::SampleBlock;
@@ -13,7 +14,7 @@ use vasos_io::recording::{Recording, RecordingOptions};
 use vasos_io::rig::{load_scenario, write_run_csv};
 
 use super::json::{self, shown, table};
-use super::{Answer, Refusal, ensemble};
+use super::{Answer, Refusal, ensemble, excite};
 
 /// Rows handed to the recorder at once.
 const BLOCK: usize = 5000;
@@ -76,9 +77,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
         if arguments.figures {
             whole["figures"] = run.figures().iter().map(figures_json).collect();
         }
+        if !run.excitations.is_empty() {
+            whole["tests"] = run.excitations.iter().map(test_json).collect();
+        }
         return Ok(Answer::done(json::text(&whole)));
     }
-    let figures = if arguments.figures { figures_table(&run) } else { String::new() };
+    let mut figures = if arguments.figures { figures_table(&run) } else { String::new() };
+    run.excitations.iter().for_each(|report| figures.push_str(&format!("{}\n", excite::headline(report))));
     let mut text = format!("{} rows to {} s", run.time_s.len(), shown(run.time_s.last().copied()));
     if let Some(path) = &arguments.output {
         text.push_str(&format!(", written to {}\n{figures}", path.display()));
@@ -125,6 +130,21 @@ fn figures_json(figures: &LoopFigures) -> Value {
     }
     whole.insert("reason".into(), json!(figures.metrics.as_ref().err().map(ToString::to_string)));
     Value::Object(whole)
+}
+
+/// How a test of the scenario ended.
+fn test_json(report: &ExcitationReport) -> Value {
+    let ended = match &report.ending {
+        Ending::Finished => Value::Null,
+        Ending::Stopped(reason) => json!(reason.to_string()),
+    };
+    json!({
+        "loop": report.tag,
+        "signal": report.excitation.signal.key(),
+        "from_s": report.start_s,
+        "finished": report.ending == Ending::Finished,
+        "ended": ended,
+    })
 }
 
 fn excitation(figures: &LoopFigures) -> &'static str {

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::exact::ExactTuning;
 use crate::control::{GainsError, Law, LoopOptions, Mode, PidTuning};
+use crate::excitation::{Excitation, ExcitationError};
 use crate::explain::{Explain, number};
 use crate::plant::{Fault, FaultKind, Measurement, RigError};
 
@@ -97,6 +98,18 @@ pub enum RigCommand {
         /// Seed.
         seed: u64,
     },
+    /// Begins a test on a loop, which moves it over its mode and its law until it ends.
+    Excite {
+        /// Loop.
+        tag: String,
+        /// What is done, within which limits.
+        excitation: Box<Excitation>,
+    },
+    /// Ends the test on a loop.
+    AbortExcitation {
+        /// Loop.
+        tag: String,
+    },
     /// Breaks something.
     #[serde(deserialize_with = "super::exact::fault")]
     Fault {
@@ -118,7 +131,7 @@ pub enum RigCommand {
 
 impl RigCommand {
     /// The commands as files name them.
-    pub const KEYS: [&str; 15] = [
+    pub const KEYS: [&str; 17] = [
         "setpoint",
         "mode",
         "mv",
@@ -132,6 +145,8 @@ impl RigCommand {
         "steady_at",
         "measurement",
         "seed",
+        "excite",
+        "abort_excitation",
         "fault",
         "repair",
     ];
@@ -153,6 +168,8 @@ impl RigCommand {
             Self::SteadyAt { .. } => "steady_at",
             Self::Measurement { .. } => "measurement",
             Self::Seed { .. } => "seed",
+            Self::Excite { .. } => "excite",
+            Self::AbortExcitation { .. } => "abort_excitation",
             Self::Fault { .. } => "fault",
             Self::Repair { .. } => "repair",
         }
@@ -168,6 +185,9 @@ pub enum CommandError {
     /// The gains are not usable.
     #[error(transparent)]
     Gains(#[from] GainsError),
+    /// The test cannot begin, or there is none to end.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
     /// No such loop, pump, valve, tank or configuration now.
     #[error("there is no {tag} in the present configuration")]
     UnknownTag {
@@ -228,6 +248,7 @@ impl Explain for CommandError {
         match self {
             Self::Rig(error) => error.key(),
             Self::Gains(error) => error.key(),
+            Self::Excitation(error) => error.key(),
             Self::UnknownTag { .. } => "command.unknown_tag",
             Self::Setpoint { .. } => "command.setpoint",
             Self::Automatic { .. } => "command.automatic",
@@ -243,6 +264,7 @@ impl Explain for CommandError {
         match self {
             Self::Rig(error) => error.args(),
             Self::Gains(error) => error.args(),
+            Self::Excitation(error) => error.args(),
             Self::UnknownTag { tag } | Self::Automatic { tag } | Self::Cascade { tag } => {
                 vec![("tag", tag.clone())]
             }

@@ -1,8 +1,11 @@
 //! What a session says.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::command::{CommandError, RigCommand};
+use crate::excitation::{ExcitationReport, Progress};
 
 /// A state that an operator should know of. It begins and ends as an event each.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -97,6 +100,15 @@ pub enum EventKind {
     Refused(CommandError),
     /// An alarm began (`true`) or ended.
     Alarm(Alarm, bool),
+    /// A test on a loop came to another phase or cycle; at most one in a few seconds of the run within a phase.
+    ExcitationProgress {
+        /// Loop.
+        tag: String,
+        /// How far it is.
+        progress: Progress,
+    },
+    /// A test on a loop ended, with what came of it; the loop is as it was before.
+    ExcitationEnded(Arc<ExcitationReport>),
     /// Samples nobody fetched were given up.
     SamplesLost {
         /// How many.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::event::Alarm;
 use crate::control::{Action, Bound, ControlOutput, Law, Limits, Mode, PidTuning};
 use crate::plant::{ActiveFault, Balance, Measurement, Network, ReadingStatus};
-use crate::sim::LoopTarget;
+use crate::sim::{ExcitationNow, LoopTarget};
 
 /// A tank now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,6 +124,8 @@ pub struct Snapshot {
     pub alarms: Vec<Alarm>,
     /// Faults that have been switched on.
     pub faults: Vec<ActiveFault>,
+    /// The test that runs on a loop.
+    pub excitation: Option<ExcitationNow>,
 }
 
 impl Snapshot {
@@ -148,6 +150,7 @@ impl Snapshot {
             balance_error_cm3: 0.0,
             alarms: vec![],
             faults: vec![],
+            excitation: None,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::sink::Sink;
 use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 use super::{Notify, Rig, SessionCommand};
 use crate::control::Limits;
+use crate::excitation::{Progress, StopReason};
 use crate::plant::{Measurement, Plant};
 use crate::signal::SampleBlock;
 use crate::sim::ClosedLoop;
@@ -23,6 +24,8 @@ const TICK: Duration = Duration::from_millis(10);
 const BUDGET: Duration = Duration::from_millis(12);
 /// Samples kept for a reader that does not fetch them: an hour and a half at 200 ms and 20 ×.
 const MOST_PENDING: usize = 500_000;
+/// Seconds of the run between two words on the cycles of a test.
+const BETWEEN_CYCLES_S: f64 = 5.0;
 /// Events kept likewise.
 const MOST_EVENTS: usize = 10_000;
 
@@ -35,6 +38,8 @@ pub(super) struct Worker {
     achieved_speed: f64,
     baseline_cm3: f64,
     alarms: AlarmTable,
+    /// Progress of the test as it was last told.
+    told: Option<Progress>,
     fresh: SampleBlock,
     pending: SampleBlock,
     pending_events: Vec<Event>,
@@ -69,6 +74,7 @@ impl Worker {
             achieved_speed: f64::NAN,
             baseline_cm3: 0.0,
             alarms: AlarmTable::new(&closed),
+            told: None,
             fresh: empty.clone(),
             pending: empty,
             pending_events: vec![],
@@ -157,14 +163,37 @@ impl Worker {
         self.changed = true;
         if let Err(reason) = outcome {
             self.stop(reason);
+            drop(guarded(|| self.closed.stop_excitation(StopReason::Defect)));
+            self.tell_excitation();
             return false;
         }
+        self.tell_excitation();
         let mut changes = Vec::new();
         self.alarms.update(&self.closed, |alarm, on| changes.push((alarm.clone(), on)));
         for (alarm, on) in changes {
             self.say(EventKind::Alarm(alarm, on));
         }
         true
+    }
+
+    /// Says how the test goes on: every phase, cycles at intervals, and its end.
+    fn tell_excitation(&mut self) {
+        if self.closed.has_ended_excitations() {
+            let reports: Vec<_> = self.closed.ended_excitations().collect();
+            for report in reports {
+                self.say(EventKind::ExcitationEnded(Arc::new(report)));
+            }
+            self.told = None;
+        }
+        let Some(progress) = self.closed.excitation_progress() else { return };
+        let news = self.told.is_none_or(|told| {
+            let later = progress.elapsed_s - told.elapsed_s >= BETWEEN_CYCLES_S;
+            progress.phase != told.phase || progress.cycle != told.cycle && later
+        });
+        if news && let Some(now) = self.closed.excitation() {
+            self.told = Some(progress);
+            self.say(EventKind::ExcitationProgress { tag: now.tag, progress });
+        }
     }
 
     /// Carries out a command and those that wait behind it, as the budget allows; false at shutdown.
@@ -196,6 +225,7 @@ impl Worker {
                         self.alarms = AlarmTable::new(&self.closed);
                     }
                     self.say(EventKind::Done(command));
+                    self.tell_excitation();
                 }
                 Err(error) => self.say(EventKind::Refused(error)),
             },
@@ -247,6 +277,8 @@ impl Worker {
     fn load(&mut self, rig: &Rig) {
         match ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed) {
             Ok(closed) => {
+                self.closed.stop_excitation(StopReason::NewRun);
+                self.tell_excitation();
                 self.hand_to_sinks();
                 self.closed = closed;
                 self.run += 1;
@@ -386,6 +418,7 @@ impl Worker {
             balance_error_cm3: self.total_cm3() - self.baseline_cm3,
             alarms: self.alarms.active(),
             faults: closed.source().faults().to_vec(),
+            excitation: closed.excitation(),
         }
     }
 }

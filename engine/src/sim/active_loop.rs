@@ -21,6 +21,15 @@ enum Disturbance {
     Pump(usize),
 }
 
+/// What a test has a loop do, over its mode and its law, which stay as they are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Forced {
+    /// Give this output, in MV units.
+    Output(f64),
+    /// Control to this setpoint in cm.
+    Setpoint(f64),
+}
+
 /// A loop of the present configuration with its place in the rig.
 #[derive(Debug, Clone)]
 pub struct ActiveLoop {
@@ -40,6 +49,10 @@ pub struct ActiveLoop {
     pub control: ControlLoop,
     /// The last output was held because the input was not a number.
     pub held: bool,
+    /// Output that it was put to since the last sample, by hand or at the end of a test.
+    pub(super) put: Option<f64>,
+    /// What a test has it do.
+    pub(super) forced: Option<Forced>,
     disturbance: Option<Disturbance>,
 }
 
@@ -70,6 +83,8 @@ impl ActiveLoop {
             outer: outer_of(specs, &spec.id),
             control: ControlLoop::new(&spec, sample_time_s, range, mv),
             held: false,
+            put: None,
+            forced: None,
             disturbance: None,
             target,
             range,
@@ -77,6 +92,12 @@ impl ActiveLoop {
         };
         active.find_disturbance(network);
         Some(active)
+    }
+
+    /// Puts the output to a value from which the next sample goes on.
+    pub(super) fn put_to(&mut self, mv: f64) {
+        self.control.set_mv(mv);
+        self.put = Some(self.control.mv());
     }
 
     /// Looks up where the feed-forward takes its disturbance from, after a change of the options.
@@ -92,6 +113,12 @@ impl ActiveLoop {
         self.control = ControlLoop::new(&self.spec, sample_time_s, self.range, mv).taking_over();
     }
 
+    /// Whether it takes its setpoint from its outer loop.
+    #[must_use]
+    pub fn listens(&self) -> bool {
+        self.control.mode == Mode::Cascade && self.forced.is_none()
+    }
+
     fn disturbance(&self, readings: &[Reading], inputs: &[f64]) -> f64 {
         match self.disturbance {
             Some(Disturbance::Sensor(sensor)) => readings[sensor].level_cm,
@@ -102,18 +129,20 @@ impl ActiveLoop {
 }
 
 /// Lets the loop `index` take a sample. An outer loop whose inner loop is not in cascade follows its setpoint;
-/// an inner loop in cascade takes the outer's output. `inputs` are the pumps' inputs as last written.
+/// an inner loop in cascade takes the outer's output, unless a test has it do something else. `inputs` are the pumps'
+/// inputs as last written.
 pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading], inputs: &[f64]) {
+    let put = loops[index].put.take();
     let mut follows = None;
     let mut blocked: Option<Bound> = None;
     match loops[index].target {
-        LoopTarget::Loop(inner) if loops[inner].control.mode != Mode::Cascade => {
+        LoopTarget::Loop(inner) if !loops[inner].listens() => {
             follows = Some(loops[inner].control.setpoint_cm);
         }
         LoopTarget::Loop(inner) => blocked = blocked_by(loops, inner),
         LoopTarget::Pump(pump) => {
             if loops[index].control.sends_increments() {
-                follows = Some(inputs[pump]);
+                follows = Some(put.unwrap_or(inputs[pump]));
             }
         }
     }
@@ -125,6 +154,17 @@ pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading
         if matches!(active.target, LoopTarget::Loop(_)) {
             actual = Mode::Manual;
         }
+    }
+    match active.forced {
+        Some(Forced::Output(mv)) => {
+            active.control.set_mv(mv);
+            actual = Mode::Manual;
+        }
+        Some(Forced::Setpoint(setpoint_cm)) => {
+            active.control.setpoint_cm = setpoint_cm;
+            actual = Mode::Automatic;
+        }
+        None => {}
     }
     if let (Mode::Cascade, Some(setpoint_cm)) = (actual, remote) {
         active.control.setpoint_cm = setpoint_cm;
@@ -141,7 +181,7 @@ pub(super) fn sample(loops: &mut [ActiveLoop], index: usize, readings: &[Reading
 /// The side to which the setpoint of the loop `inner` must not go further, as of the last sample.
 fn blocked_by(loops: &[ActiveLoop], inner: usize) -> Option<Bound> {
     let deeper = match loops[inner].target {
-        LoopTarget::Loop(next) if loops[next].control.mode == Mode::Cascade => blocked_by(loops, next),
+        LoopTarget::Loop(next) if loops[next].listens() => blocked_by(loops, next),
         _ => None,
     };
     loops[inner].control.blocks_outer(deeper)

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use super::active_loop::{ActiveLoop, LoopTarget, sample};
+use super::excite::Excited;
 use crate::control::{LoopSpec, Mode, check_filter, check_loop, execution_order, outer_of};
 use crate::daq::{RigControls, SimulatedRig, Source};
+use crate::excitation::StopReason;
 use crate::plant::{
     ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, SteadyState,
     SteadyTarget, steady_at_level, steady_at_levels,
@@ -15,19 +17,21 @@ use crate::signal::ChannelSet;
 /// A source under control.
 pub struct ClosedLoop {
     source: Box<dyn Source>,
-    network: Arc<Network>,
+    pub(super) network: Arc<Network>,
     channels: Arc<ChannelSet>,
     configuration: usize,
     settings: Vec<Vec<LoopSpec>>,
-    loops: Vec<ActiveLoop>,
+    pub(super) loops: Vec<ActiveLoop>,
     /// Indices of the loops, outer ones first.
     order: Vec<usize>,
     /// Inputs of the pumps as last written.
     inputs: Vec<f64>,
-    readings: Vec<Reading>,
+    pub(super) readings: Vec<Reading>,
     row: Vec<f64>,
     sample_time_s: f64,
-    samples: u64,
+    pub(super) samples: u64,
+    pub(super) excited: Option<Excited>,
+    pub(super) ended: Vec<Excited>,
 }
 
 impl ClosedLoop {
@@ -86,6 +90,8 @@ impl ClosedLoop {
             order: Vec::new(),
             inputs: network.pumps.iter().map(|p| p.min).collect(),
             samples: 0,
+            excited: None,
+            ended: Vec::new(),
             configuration,
             source,
             network,
@@ -158,6 +164,7 @@ impl ClosedLoop {
     /// at the sample's time; flows are the means of the sample before it.
     pub fn step(&mut self) -> &[f64] {
         self.source.read(&mut self.readings);
+        self.excite_sample();
         for &index in &self.order {
             sample(&mut self.loops, index, &self.readings, &self.inputs);
             let active = &mut self.loops[index];
@@ -171,6 +178,7 @@ impl ClosedLoop {
                 }
             }
         }
+        self.record_excitation();
         self.fill_row();
         self.source.advance(self.sample_time_s);
         self.samples += 1;
@@ -225,7 +233,7 @@ impl ClosedLoop {
         self.order.truncate(self.loops.len());
     }
 
-    fn find(&mut self, tag: &str) -> Result<&mut ActiveLoop, CommandError> {
+    pub(super) fn find(&mut self, tag: &str) -> Result<&mut ActiveLoop, CommandError> {
         let unknown = || CommandError::UnknownTag { tag: tag.to_owned() };
         self.loops.iter_mut().find(|l| l.spec.id == tag).ok_or_else(unknown)
     }
@@ -235,6 +243,13 @@ impl ClosedLoop {
     /// # Errors
     /// [`CommandError`]; nothing has changed then.
     pub fn apply(&mut self, command: &RigCommand) -> Result<(), CommandError> {
+        match self.overrules(command) {
+            Some(reason) => self.apply_overruling(command, reason),
+            None => self.carry_out(command),
+        }
+    }
+
+    pub(super) fn carry_out(&mut self, command: &RigCommand) -> Result<(), CommandError> {
         let unknown = |tag: &str| CommandError::UnknownTag { tag: tag.to_owned() };
         match command {
             RigCommand::Setpoint { tag, level_cm } => self.set_setpoint(tag, *level_cm)?,
@@ -283,6 +298,8 @@ impl ClosedLoop {
             RigCommand::Repair { tag, kind } => {
                 self.source.rig().ok_or(CommandError::NotARig)?.repair(tag, *kind)?;
             }
+            RigCommand::Excite { tag, excitation } => self.excite(tag, excitation)?,
+            RigCommand::AbortExcitation { tag } => self.abort_excitation(tag)?,
             RigCommand::Seed { seed } => self.source.rig().ok_or(CommandError::NotARig)?.set_seed(*seed),
         }
         Ok(())
@@ -345,7 +362,7 @@ impl ClosedLoop {
                 let inner = self.loops[inner].spec.id.clone();
                 return Err(CommandError::Follows { tag: tag.to_owned(), inner });
             }
-            self.loops[index].control.set_mv(value);
+            self.loops[index].put_to(value);
             return Ok(());
         }
         let Some(LoopTarget::Pump(pump)) = pump else {
@@ -410,6 +427,7 @@ impl ClosedLoop {
     /// # Errors
     /// [`CommandError`] when the source is no rig or the water does not fit.
     pub fn restart_at(&mut self, levels_cm: &[f64], inputs: &[f64]) -> Result<(), CommandError> {
+        self.stop_excitation(StopReason::Restarted);
         self.rest(&SteadyState { levels_cm: levels_cm.to_vec(), inputs: inputs.to_vec() })
     }
 

@@ -4,6 +4,7 @@ mod active_loop;
 mod closed_loop;
 mod compare;
 mod ensemble;
+mod excite;
 mod figures;
 mod flock;
 mod real_rig;
@@ -15,8 +16,11 @@ pub use active_loop::{ActiveLoop, LoopTarget};
 pub use closed_loop::ClosedLoop;
 pub use compare::{CompareError, Comparison, InputSeries, ModelKind, ModelTrace, agreement};
 pub use ensemble::{EnsembleRun, MOST_MEMBERS, MemberFigures, Spread, quantile, run_ensemble, vary};
+pub use excite::ExcitationNow;
 pub use figures::LoopFigures;
 pub use real_rig::{LevelResistance, record_real_rig};
-pub use scenario::{Run, Scenario, ScenarioError, Start, run_scenario, run_scenario_while, scenario_start};
+pub use scenario::{
+    Run, Scenario, ScenarioError, Start, run_excitation, run_scenario, run_scenario_while, scenario_start,
+};
 pub use scenario_event::ScenarioEvent;
 pub use start::{StartError, check_starts};

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::closed_loop::ClosedLoop;
 use super::scenario_event::ScenarioEvent;
+use crate::excitation::{Excitation, ExcitationReport};
 use crate::explain::{Explain, number};
 use crate::plant::{Measurement, Network, OperatingPoint, RigError};
-use crate::session::CommandError;
+use crate::session::{CommandError, Rig, RigCommand};
 use crate::signal::ChannelSet;
 
 /// How a run starts.
@@ -73,6 +74,8 @@ pub struct Run {
     pub values: Vec<f64>,
     /// Steps of the integrator.
     pub integrator_steps: u64,
+    /// Tests on its loops, in the order in which they ended.
+    pub excitations: Vec<ExcitationReport>,
 }
 
 impl Run {
@@ -213,7 +216,7 @@ pub fn run_scenario(network: Arc<Network>, scenario: &Scenario) -> Result<Run, S
     let Prepared { mut closed, events, samples } = prepare(&network, scenario)?;
     let mut run = Rows::new(scenario);
     run_samples(&mut closed, &events, samples, |sample, now_s, row| run.see(sample, now_s, row))?;
-    Ok(run.finish(&closed))
+    Ok(run.finish(&mut closed))
 }
 
 /// Samples between two questions whether to go on.
@@ -242,7 +245,38 @@ pub fn run_scenario_while(
         due = &due[used..];
         done += count;
     }
-    Ok(Some(run.finish(&closed)))
+    Ok(Some(run.finish(&mut closed)))
+}
+
+/// Runs a test on a loop of a simulated rig until it ends: from the state of the rig's file in a configuration, or
+/// with the rig at rest with the loop's level at `level_cm`.
+///
+/// # Errors
+/// [`CommandError`] when the rig cannot start there, or the test is refused.
+pub fn run_excitation(
+    rig: &Rig,
+    tag: &str,
+    level_cm: Option<f64>,
+    excitation: &Excitation,
+) -> Result<(Run, ExcitationReport), CommandError> {
+    let mut closed =
+        ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed)?;
+    if let Some(level_cm) = level_cm {
+        closed.apply(&RigCommand::SteadyAt { tag: tag.to_owned(), level_cm })?;
+    }
+    let excitation = Box::new(excitation.clone());
+    closed.apply(&RigCommand::Excite { tag: tag.to_owned(), excitation })?;
+    let mut rows = Rows { keep: 1, time_s: Vec::new(), values: Vec::new() };
+    for sample in 0.. {
+        let now_s = closed.time_s();
+        rows.see(sample, now_s, closed.step());
+        if closed.has_ended_excitations() {
+            break;
+        }
+    }
+    let mut run = rows.finish(&mut closed);
+    let report = run.excitations.remove(0);
+    Ok((run, report))
 }
 
 /// The rows of a run as they come.
@@ -264,10 +298,11 @@ impl Rows {
         }
     }
 
-    fn finish(self, closed: &ClosedLoop) -> Run {
+    fn finish(self, closed: &mut ClosedLoop) -> Run {
         let integrator_steps = closed.source().plant().map_or(0, crate::plant::Plant::steps);
         let Self { time_s, values, .. } = self;
-        Run { channels: closed.channels().clone(), time_s, values, integrator_steps }
+        let excitations = closed.ended_excitations().collect();
+        Run { channels: closed.channels().clone(), time_s, values, integrator_steps, excitations }
     }
 }
 

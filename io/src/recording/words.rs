@@ -2,6 +2,7 @@
 
 use rerun::TextLogLevel;
 use vasos_engine::control::Mode;
+use vasos_engine::excitation::Ending;
 use vasos_engine::explain::number;
 use vasos_engine::session::{Alarm, EventKind, RigCommand};
 
@@ -16,6 +17,14 @@ pub(super) fn line(kind: &EventKind) -> (&'static str, String) {
         EventKind::Refused(error) => (warning, format!("refused: {error}")),
         EventKind::Alarm(alarm, true) => (warning, format!("alarm: {}", state(alarm))),
         EventKind::Alarm(alarm, false) => (info, format!("over: {}", state(alarm))),
+        EventKind::ExcitationProgress { tag, progress } => {
+            let cycle = if progress.cycle > 0 { format!(" {}", progress.cycle) } else { String::new() };
+            (info, format!("{tag}: test {}{cycle}", progress.phase.key().replace('_', " ")))
+        }
+        EventKind::ExcitationEnded(report) => match &report.ending {
+            Ending::Finished => (info, format!("{}: test finished", report.tag)),
+            Ending::Stopped(reason) => (warning, format!("{}: test {reason}", report.tag)),
+        },
         EventKind::SamplesLost { count } => (warning, format!("{count} samples given up")),
         EventKind::EventsLost { count } => (warning, format!("{count} events given up")),
         EventKind::Stopped { reason } => (TextLogLevel::ERROR, format!("stopped by a defect: {reason}")),
@@ -60,6 +69,10 @@ fn done(command: &RigCommand) -> String {
             let [noise, quantisation, resolution] = [m.noise, m.quantisation, m.resolution].map(on);
             format!("noise {noise}, quantisation {quantisation}, resolution {resolution}")
         }
+        RigCommand::Excite { tag, excitation } => {
+            format!("{tag}: test {} begun", excitation.signal.key().replace('_', " "))
+        }
+        RigCommand::AbortExcitation { tag } => format!("{tag}: end of the test asked for"),
         RigCommand::Fault { tag, fault } => format!("{tag}: fault {}", fault.kind().key()),
         RigCommand::Repair { tag, kind } => {
             format!("{tag}: repaired{}", kind.map_or(String::new(), |k| format!(" ({})", k.key())))
