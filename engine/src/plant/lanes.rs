@@ -31,8 +31,12 @@ pub(crate) trait Number:
     fn of_plant(&self, plant: usize) -> f64;
     /// Square root.
     fn sqrt(self) -> Self;
-    /// The larger of both, plant by plant.
+    /// The larger of both, plant by plant; a NaN stays one.
     fn at_least(self, least: f64) -> Self;
+    /// Whether it is below a bound in every plant; a NaN is not.
+    fn is_below(self, bound: f64) -> bool;
+    /// Whether it is at most as large as another in every plant; a NaN is not.
+    fn is_at_most(self, most: Self) -> bool;
     /// Smallest over the plants; NaN counts as −∞.
     fn smallest(self) -> f64;
     /// Largest over the plants.
@@ -64,7 +68,17 @@ impl Number for f64 {
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        self.max(least)
+        if self < least { least } else { self }
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: f64) -> bool {
+        self < bound
+    }
+
+    #[inline(always)]
+    fn is_at_most(self, most: Self) -> bool {
+        self <= most
     }
 
     #[inline(always)]
@@ -189,7 +203,25 @@ impl<const L: usize> Number for Pack<L> {
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        self.all(|x| x.max(least))
+        self.all(|x| x.at_least(least))
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: f64) -> bool {
+        let mut below = true;
+        for x in self.0 {
+            below &= x < bound;
+        }
+        below
+    }
+
+    #[inline(always)]
+    fn is_at_most(self, most: Self) -> bool {
+        let mut within = true;
+        for (x, most) in self.0.iter().zip(&most.0) {
+            within &= x <= most;
+        }
+        within
     }
 
     #[inline(always)]

@@ -18,6 +18,7 @@ mod network;
 mod pipe;
 mod pump_curve;
 mod rims;
+mod roots;
 mod sensor;
 pub mod spec;
 mod state;

@@ -190,7 +190,7 @@ impl Network {
             reservoir: spec.reservoir.as_deref().map(|r| tank_index(&spec, &spec.id, r)).transpose()?,
             spec,
         };
-        let parts = widest(&network);
+        let parts = widest(&network).max(network.valves.len() + network.tanks.len());
         let expected = format!("at most {MOST_PARTS} tanks, valves and pumps");
         demand(&network.spec.id, "size", parts as f64, parts <= MOST_PARTS, expected)?;
         for configuration in &network.spec.configurations {

@@ -38,6 +38,7 @@ pub(super) fn can_flock(closed: &ClosedLoop, events: &[ScenarioEvent]) -> bool {
     plain
         && !closed.loops().is_empty()
         && widest(closed.network()) <= LONGEST
+        && closed.network().valves.len() <= LONGEST
         && closed.source().faults().is_empty()
         && events.iter().all(|e| simple(&e.command))
 }
@@ -51,10 +52,10 @@ pub(super) fn run_flock(
     events: &[ScenarioEvent],
     samples: u64,
 ) -> Option<Vec<Watch>> {
-    if widest(start.network()) <= 8 {
-        Flock::<8>::new(start, rigs, measurement).run(events, samples)
+    if widest(start.network()) <= 8 && start.network().valves.len() <= 4 {
+        Flock::<8, 4>::new(start, rigs, measurement).run(events, samples)
     } else {
-        Flock::<LONGEST>::new(start, rigs, measurement).run(events, samples)
+        Flock::<LONGEST, LONGEST>::new(start, rigs, measurement).run(events, samples)
     }
 }
 
@@ -71,8 +72,8 @@ struct Member {
 }
 
 /// Plants that share a step.
-struct Flock<const N: usize> {
-    motion: Motion<N, Lanes>,
+struct Flock<const N: usize, const S: usize> {
+    motion: Motion<N, S, Lanes>,
     members: Vec<Member>,
     /// Sensor and pump of each loop.
     wiring: Vec<(usize, usize)>,
@@ -83,7 +84,7 @@ struct Flock<const N: usize> {
     sample_time_s: f64,
 }
 
-impl<const N: usize> Flock<N> {
+impl<const N: usize, const S: usize> Flock<N, S> {
     /// Plants of these rigs and seeds, in the state of `start`.
     fn new(start: &ClosedLoop, rigs: &[(Arc<Network>, u64)], measurement: Measurement) -> Self {
         let network = start.network();
@@ -103,6 +104,7 @@ impl<const N: usize> Flock<N> {
         for (end, &level) in motion.end.iter_mut().zip(levels) {
             *end = Lanes::of(level);
         }
+        motion.counts = false;
         motion.restart();
         let spec = &network.spec;
         let loops = start.loops();
