@@ -1,9 +1,11 @@
 //! Numbers of one plant, or of several plants side by side.
 //!
 //! The integrator is written once for both: with `f64` it moves one plant, with [`Pack`] several at a time, whose
-//! arithmetic the compiler turns into vector instructions.
+//! arithmetic is that of vector registers.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+use wide::f64x4;
 
 /// What the integrator needs of a number.
 pub(crate) trait Number:
@@ -92,153 +94,126 @@ impl Number for f64 {
     }
 }
 
-/// A number of each of `L` plants.
+/// A number of each of four plants.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
-pub(crate) struct Pack<const L: usize>(pub [f64; L]);
+pub(crate) struct Pack(f64x4);
 
-impl<const L: usize> Pack<L> {
+impl Pack {
+    /// The number of one plant, to be changed.
     #[inline(always)]
-    fn each(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        // A plain loop: `array::from_fn` is not always taken apart into vector instructions.
-        for i in 0..L {
-            self.0[i] = f(self.0[i], other.0[i]);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn all(mut self, f: impl Fn(f64) -> f64) -> Self {
-        for x in &mut self.0 {
-            *x = f(*x);
-        }
-        self
+    pub fn plant_mut(&mut self, plant: usize) -> &mut f64 {
+        &mut self.0.as_mut_array()[plant]
     }
 }
 
-impl<const L: usize> Add for Pack<L> {
+impl Add for Pack {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.each(other, |a, b| a + b)
+        Self(self.0 + other.0)
     }
 }
 
-impl<const L: usize> Sub for Pack<L> {
+impl Sub for Pack {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.each(other, |a, b| a - b)
+        Self(self.0 - other.0)
     }
 }
 
-impl<const L: usize> Mul for Pack<L> {
+impl Mul for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.each(other, |a, b| a * b)
+        Self(self.0 * other.0)
     }
 }
 
-impl<const L: usize> Div for Pack<L> {
+impl Div for Pack {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        self.each(other, |a, b| a / b)
+        Self(self.0 / other.0)
     }
 }
 
-impl<const L: usize> Mul<f64> for Pack<L> {
+impl Mul<f64> for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
-        self.all(|x| x * factor)
+        Self(self.0 * f64x4::splat(factor))
     }
 }
 
-impl<const L: usize> Neg for Pack<L> {
+impl Neg for Pack {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.all(|x| -x)
+        Self(-self.0)
     }
 }
 
-impl<const L: usize> AddAssign for Pack<L> {
+impl AddAssign for Pack {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const L: usize> SubAssign for Pack<L> {
+impl SubAssign for Pack {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl<const L: usize> Number for Pack<L> {
-    const PLANTS: usize = L;
+impl Number for Pack {
+    const PLANTS: usize = 4;
 
     #[inline(always)]
     fn each_of(number: impl FnMut(usize) -> f64) -> Self {
-        Self(std::array::from_fn(number))
+        Self(f64x4::new(std::array::from_fn(number)))
     }
 
     #[inline(always)]
     fn of_plant(&self, plant: usize) -> f64 {
-        self.0[plant]
+        self.0.as_array()[plant]
     }
 
     #[inline(always)]
     fn of(x: f64) -> Self {
-        Self([x; L])
+        Self(f64x4::splat(x))
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        self.all(f64::sqrt)
+        Self(self.0.sqrt())
     }
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        self.all(|x| x.at_least(least))
+        let least = f64x4::splat(least);
+        Self(self.0.simd_lt(least).bitselect(least, self.0))
     }
 
     #[inline(always)]
     fn is_below(self, bound: f64) -> bool {
-        let mut below = true;
-        for x in self.0 {
-            below &= x < bound;
-        }
-        below
+        self.0.simd_lt(f64x4::splat(bound)).all()
     }
 
     #[inline(always)]
     fn is_at_most(self, most: Self) -> bool {
-        let mut within = true;
-        for (x, most) in self.0.iter().zip(&most.0) {
-            within &= x <= most;
-        }
-        within
+        self.0.simd_le(most.0).all()
     }
 
     #[inline(always)]
     fn smallest(self) -> f64 {
-        let mut least = f64::INFINITY;
-        for x in self.0 {
-            least = least.min(x.smallest());
-        }
-        least
+        self.0.as_array().iter().fold(f64::INFINITY, |least, x| least.min(x.smallest()))
     }
 
     #[inline(always)]
     fn largest(self) -> f64 {
-        let mut most = f64::NEG_INFINITY;
-        for x in self.0 {
-            most = most.max(x);
-        }
-        most
+        self.0.as_array().iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
     }
 }

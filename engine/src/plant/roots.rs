@@ -50,17 +50,18 @@ impl<const S: usize, V: Number> Roots<S, V> {
     /// x^(−¼) of the first `count` streams.
     #[inline(always)]
     pub fn at(&self, x: &[V; S], count: usize) -> [V; S] {
-        let mut roots = [V::of(0.0); S];
-        let mut near = true;
+        let (mut t, mut near) = ([V::of(0.0); S], true);
         for i in 0..count.min(S) {
-            let t = V::of(1.0) - x[i] * self.inverse[i];
-            near &= (t * t).is_below(NEAR);
-            roots[i] = self.root[i] * series(t);
+            t[i] = V::of(1.0) - x[i] * self.inverse[i];
+            near &= (t[i] * t[i]).is_below(NEAR);
         }
         if !near {
-            take(x, count, &mut roots);
+            return taken(x, count);
         }
-        roots
+        for i in 0..count.min(S) {
+            t[i] = self.root[i] * series(t[i]);
+        }
+        t
     }
 
     /// Goes on from these x^(−¼).
@@ -75,10 +76,12 @@ impl<const S: usize, V: Number> Roots<S, V> {
 
 /// The roots taken as such.
 #[inline(never)]
-fn take<const S: usize, V: Number>(x: &[V; S], count: usize, roots: &mut [V; S]) {
+fn taken<const S: usize, V: Number>(x: &[V; S], count: usize) -> [V; S] {
+    let mut roots = [V::of(0.0); S];
     for i in 0..count.min(S) {
         roots[i] = V::of(1.0) / x[i].sqrt().sqrt();
     }
+    roots
 }
 
 #[cfg(test)]

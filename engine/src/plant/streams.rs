@@ -198,11 +198,11 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         self.streams.iter().any(|s| s.from == tank || s.against == tank)
     }
 
-    /// How much of an array over streams to work through: all of it where one plant's is short, since the compiler knows
-    /// its length.
+    /// How much of an array over streams to work through: all of it where that is little, since the compiler knows its
+    /// length.
     #[inline(always)]
     pub fn slots(&self) -> usize {
-        if V::PLANTS == 1 && S <= SHORT { S } else { self.streams.len().min(S) }
+        if S * V::PLANTS <= SHORT { S } else { self.streams.len().min(S) }
     }
 
     /// An array over streams.

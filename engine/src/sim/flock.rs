@@ -17,11 +17,11 @@ use crate::plant::{
 use crate::session::RigCommand;
 
 /// Plants of a flock.
-pub(super) const PLANTS: usize = 4;
+pub(super) const PLANTS: usize = Lanes::PLANTS;
 /// Longest arrays the lanes are made for; larger rigs run one by one.
 const LONGEST: usize = 16;
 
-type Lanes = Pack<PLANTS>;
+type Lanes = Pack;
 
 /// Whether these loops and commands can be followed in lanes.
 pub(super) fn can_flock(closed: &ClosedLoop, events: &[ScenarioEvent]) -> bool {
@@ -52,10 +52,13 @@ pub(super) fn run_flock(
     events: &[ScenarioEvent],
     samples: u64,
 ) -> Option<Vec<Watch>> {
-    if widest(start.network()) <= 8 && start.network().valves.len() <= 4 {
-        Flock::<8, 4>::new(start, rigs, measurement).run(events, samples)
-    } else {
-        Flock::<LONGEST, LONGEST>::new(start, rigs, measurement).run(events, samples)
+    let network = start.network();
+    match (widest(network), network.valves.len()) {
+        (0..=8, 0..=1) => Flock::<8, 1>::new(start, rigs, measurement).run(events, samples),
+        (0..=8, 2) => Flock::<8, 2>::new(start, rigs, measurement).run(events, samples),
+        (0..=8, 3) => Flock::<8, 3>::new(start, rigs, measurement).run(events, samples),
+        (0..=8, 4) => Flock::<8, 4>::new(start, rigs, measurement).run(events, samples),
+        _ => Flock::<LONGEST, LONGEST>::new(start, rigs, measurement).run(events, samples),
     }
 }
 
@@ -161,7 +164,7 @@ impl<const N: usize, const S: usize> Flock<N, S> {
                 }
                 member.written[pump] = written;
                 let flow = of.flow_near(converted.clamp(of.min, of.max), &mut member.pieces[pump]);
-                self.motion.commanded[pump].0[plant] = flow;
+                *self.motion.commanded[pump].plant_mut(plant) = flow;
             }
             if let (Some(first), Some(&(sensor, _))) = (member.loops.first(), self.wiring.first()) {
                 let pv_cm = member.readings[sensor].level_cm;
