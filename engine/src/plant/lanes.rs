@@ -35,8 +35,16 @@ pub(crate) trait Number:
     fn sqrt(self) -> Self;
     /// The larger of both, plant by plant; a NaN stays one.
     fn at_least(self, least: f64) -> Self;
-    /// Whether it is below a bound in every plant; a NaN is not.
-    fn is_below(self, bound: f64) -> bool;
+    /// The larger of two, plant by plant.
+    fn larger(self, other: Self) -> Self;
+    /// The smaller of two, plant by plant.
+    fn smaller(self, other: Self) -> Self;
+    /// |x|.
+    fn abs(self) -> Self;
+    /// 0 where it is not finite.
+    fn finite_or_zero(self) -> Self;
+    /// Whether it is below another in every plant; a NaN is not.
+    fn is_below(self, bound: Self) -> bool;
     /// Whether it is at most as large as another in every plant; a NaN is not.
     fn is_at_most(self, most: Self) -> bool;
     /// Smallest over the plants; NaN counts as −∞.
@@ -74,7 +82,27 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn is_below(self, bound: f64) -> bool {
+    fn larger(self, other: Self) -> Self {
+        if self < other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self > other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+
+    #[inline(always)]
+    fn finite_or_zero(self) -> Self {
+        if self.is_finite() { self } else { 0.0 }
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: Self) -> bool {
         self < bound
     }
 
@@ -97,14 +125,6 @@ impl Number for f64 {
 /// A number of each of four plants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pack(f64x4);
-
-impl Pack {
-    /// The number of one plant, to be changed.
-    #[inline(always)]
-    pub fn plant_mut(&mut self, plant: usize) -> &mut f64 {
-        &mut self.0.as_mut_array()[plant]
-    }
-}
 
 impl Add for Pack {
     type Output = Self;
@@ -198,8 +218,28 @@ impl Number for Pack {
     }
 
     #[inline(always)]
-    fn is_below(self, bound: f64) -> bool {
-        self.0.simd_lt(f64x4::splat(bound)).all()
+    fn larger(self, other: Self) -> Self {
+        Self(other.0.fast_max(self.0))
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        Self(other.0.fast_min(self.0))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+
+    #[inline(always)]
+    fn finite_or_zero(self) -> Self {
+        Self(self.0.is_finite().bitselect(self.0, f64x4::ZERO))
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: Self) -> bool {
+        self.0.simd_lt(bound.0).all()
     }
 
     #[inline(always)]

@@ -53,7 +53,7 @@ impl<const S: usize, V: Number> Roots<S, V> {
         let (mut t, mut near) = ([V::of(0.0); S], true);
         for i in 0..count.min(S) {
             t[i] = V::of(1.0) - x[i] * self.inverse[i];
-            near &= (t[i] * t[i]).is_below(NEAR);
+            near &= (t[i] * t[i]).is_below(V::of(NEAR));
         }
         if !near {
             return taken(x, count);
