@@ -265,11 +265,12 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     /// Whether every tank can hold and give what the step moves.
     #[inline(always)]
     fn is_inside(&self) -> bool {
-        let mut inside = true;
+        let mut room = V::of(f64::INFINITY);
         for (&level, &height) in self.end.iter().zip(&self.heights).take(self.tanks) {
-            inside &= V::of(0.0).is_at_most(level) & level.is_at_most(height);
+            // A level that is no number has no room.
+            room = (height - level).smaller(level).smaller(room);
         }
-        inside
+        V::of(0.0).is_at_most(room)
     }
 
     /// Starts a step at the present end.

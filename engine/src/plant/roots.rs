@@ -12,7 +12,7 @@
 
 use super::lanes::Number;
 
-/// Largest t² for which the series is good: its error there is 1.4e-11.
+/// Largest Σt² for which the series is good: its error there is 1.4e-11.
 const NEAR: f64 = 1.0 / 256.0;
 /// Binomial coefficients of (1 − t)^(−¼).
 const SERIES: [f64; 8] = [
@@ -50,12 +50,12 @@ impl<const S: usize, V: Number> Roots<S, V> {
     /// x^(−¼) of the first `count` streams.
     #[inline(always)]
     pub fn at(&self, x: &[V; S], count: usize) -> [V; S] {
-        let (mut t, mut near) = ([V::of(0.0); S], true);
+        let (mut t, mut far) = ([V::of(0.0); S], V::of(0.0));
         for i in 0..count.min(S) {
             t[i] = V::of(1.0) - x[i] * self.inverse[i];
-            near &= (t[i] * t[i]).is_below(V::of(NEAR));
+            far += t[i] * t[i];
         }
-        if !near {
+        if !far.is_below(V::of(NEAR)) {
             return taken(x, count);
         }
         for i in 0..count.min(S) {

@@ -285,18 +285,18 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     pub fn pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
         let step2 = step_s * step_s;
         let step4 = step2 * step2;
-        let mut resolved = true;
+        let mut worst = V::of(0.0);
         for i in 0..self.slots() {
             let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
             let (change2, rate4) = (change * change, self.steepness4[i] * step4);
             // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
             let scale = r2 * self.bend[i] + (V::of(1.0) - self.bend[i]);
-            resolved &= change2.is_at_most(r2 * (STEP_CURVATURE * STEP_CURVATURE));
-            resolved &= rate4.is_at_most(scale * STEP_RATE.powi(4));
             let error2 = scale * scale * (STEP_ERROR_CM * STEP_ERROR_CM);
-            resolved &= (rate4 * rate4 * change2).is_at_most(error2);
+            worst = worst.larger(change2 - r2 * (STEP_CURVATURE * STEP_CURVATURE));
+            worst = worst.larger(rate4 - scale * STEP_RATE.powi(4));
+            worst = worst.larger(rate4 * rate4 * change2 - error2);
         }
-        if resolved { 1.0 } else { self.count_pieces(heads, slope, step_s) }
+        if worst.is_at_most(V::of(0.0)) { 1.0 } else { self.count_pieces(heads, slope, step_s) }
     }
 
     #[inline(never)]
