@@ -5,8 +5,6 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-use wide::f64x4;
-
 /// What the integrator needs of a number.
 pub(crate) trait Number:
     Copy
@@ -124,13 +122,42 @@ impl Number for f64 {
 
 /// A number of each of four plants.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pack(f64x4);
+#[repr(align(32))]
+pub(crate) struct Pack([f64; 4]);
+
+impl Pack {
+    // Plain loops: `array::from_fn` is not always taken apart into vector instructions.
+    #[inline(always)]
+    fn each(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        for i in 0..4 {
+            self.0[i] = f(self.0[i], other.0[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn all(mut self, f: impl Fn(f64) -> f64) -> Self {
+        for x in &mut self.0 {
+            *x = f(*x);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn holds(self, other: Self, f: impl Fn(f64, f64) -> bool) -> bool {
+        let mut all = true;
+        for i in 0..4 {
+            all &= f(self.0[i], other.0[i]);
+        }
+        all
+    }
+}
 
 impl Add for Pack {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(self.0 + other.0)
+        self.each(other, |a, b| a + b)
     }
 }
 
@@ -138,7 +165,7 @@ impl Sub for Pack {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(self.0 - other.0)
+        self.each(other, |a, b| a - b)
     }
 }
 
@@ -146,7 +173,7 @@ impl Mul for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Self(self.0 * other.0)
+        self.each(other, |a, b| a * b)
     }
 }
 
@@ -154,7 +181,7 @@ impl Div for Pack {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        Self(self.0 / other.0)
+        self.each(other, |a, b| a / b)
     }
 }
 
@@ -162,7 +189,7 @@ impl Mul<f64> for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
-        Self(self.0 * f64x4::splat(factor))
+        self.all(|x| x * factor)
     }
 }
 
@@ -170,7 +197,7 @@ impl Neg for Pack {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(-self.0)
+        self.all(|x| -x)
     }
 }
 
@@ -192,68 +219,71 @@ impl Number for Pack {
     const PLANTS: usize = 4;
 
     #[inline(always)]
-    fn each_of(number: impl FnMut(usize) -> f64) -> Self {
-        Self(f64x4::new(std::array::from_fn(number)))
+    fn each_of(mut number: impl FnMut(usize) -> f64) -> Self {
+        let mut made = [0.0; 4];
+        for (plant, x) in made.iter_mut().enumerate() {
+            *x = number(plant);
+        }
+        Self(made)
     }
 
     #[inline(always)]
     fn of_plant(&self, plant: usize) -> f64 {
-        self.0.as_array()[plant]
+        self.0[plant]
     }
 
     #[inline(always)]
     fn of(x: f64) -> Self {
-        Self(f64x4::splat(x))
+        Self([x; 4])
     }
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(self.0.sqrt())
+        self.all(f64::sqrt)
     }
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        let least = f64x4::splat(least);
-        Self(self.0.simd_lt(least).bitselect(least, self.0))
+        self.all(|x| x.at_least(least))
     }
 
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
-        Self(other.0.fast_max(self.0))
+        self.each(other, f64::larger)
     }
 
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
-        Self(other.0.fast_min(self.0))
+        self.each(other, f64::smaller)
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(self.0.abs())
+        self.all(f64::abs)
     }
 
     #[inline(always)]
     fn finite_or_zero(self) -> Self {
-        Self(self.0.is_finite().bitselect(self.0, f64x4::ZERO))
+        self.all(f64::finite_or_zero)
     }
 
     #[inline(always)]
     fn is_below(self, bound: Self) -> bool {
-        self.0.simd_lt(bound.0).all()
+        self.holds(bound, |x, bound| x < bound)
     }
 
     #[inline(always)]
     fn is_at_most(self, most: Self) -> bool {
-        self.0.simd_le(most.0).all()
+        self.holds(most, |x, most| x <= most)
     }
 
     #[inline(always)]
     fn smallest(self) -> f64 {
-        self.0.as_array().iter().fold(f64::INFINITY, |least, x| least.min(x.smallest()))
+        self.0.iter().fold(f64::INFINITY, |least, x| least.min(x.smallest()))
     }
 
     #[inline(always)]
     fn largest(self) -> f64 {
-        self.0.as_array().iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
+        self.0.iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
     }
 }

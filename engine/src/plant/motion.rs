@@ -181,6 +181,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
 
     /// Lets `duration_s` pass with constant inputs while no tank gets to its rim or empty. Gives the time that is left
     /// where one does, and whether the pumps have had their water for it.
+    #[inline(always)]
     pub fn advance(&mut self, duration_s: f64) -> (f64, bool) {
         let fed = self.look_ahead && self.pumps_are_sure(duration_s);
         if self.look_ahead && !fed {
@@ -197,6 +198,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     }
 
     /// Whether every tank that pumps draw from has water for them without a look at the step.
+    #[inline(always)]
     fn pumps_are_sure(&self, duration_s: f64) -> bool {
         // More than one pump may draw from a tank: as many times the flow is on the safe side.
         let sure_s = 2.0 * duration_s * self.feeds.len() as f64;
@@ -207,6 +209,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     }
 
     /// Takes what the pumps draw in a sample out of its source and lets it into the air.
+    #[inline(always)]
     fn feed(&mut self, duration_s: f64) {
         for (i, feed) in self.feeds.iter().enumerate() {
             let flow = self.commanded[i];
@@ -219,6 +222,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     }
 
     /// Goes on in whole steps until `duration_s` lies in one; gives the time left when a tank stands in the way.
+    #[inline(always)]
     fn glide(&mut self, duration_s: f64) -> f64 {
         let mut left_s = duration_s;
         loop {
@@ -236,6 +240,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     }
 
     /// Takes the next step; false when a tank would pass its rim or its floor, and then nothing has changed.
+    #[inline(always)]
     fn begin_step(&mut self, longest_s: f64, left_s: f64) -> bool {
         self.count_whole();
         let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(longest_s, f64::min);
@@ -265,12 +270,13 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     /// Whether every tank can hold and give what the step moves.
     #[inline(always)]
     fn is_inside(&self) -> bool {
-        let mut room = V::of(f64::INFINITY);
+        let (mut room, mut sum) = (V::of(f64::INFINITY), V::of(0.0));
         for (&level, &height) in self.end.iter().zip(&self.heights).take(self.tanks) {
-            // A level that is no number has no room.
-            room = (height - level).smaller(level).smaller(room);
+            room = room.smaller(level).smaller(height - level);
+            sum += level;
         }
-        V::of(0.0).is_at_most(room)
+        // The sum finds a level that is no number.
+        (sum * 0.0).is_at_most(room)
     }
 
     /// Starts a step at the present end.
@@ -289,6 +295,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     }
 
     /// What pumps bring each node from now to the next change in the air.
+    #[inline(always)]
     fn set_inflow(&mut self) {
         self.inflow = [V::of(0.0); N];
         for (i, feed) in self.feeds.iter().enumerate() {

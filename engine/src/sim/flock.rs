@@ -65,6 +65,22 @@ struct Flock<'a, const N: usize, const S: usize> {
     sample_time_s: f64,
 }
 
+/// A run in the widest vector registers there are; the results are the same in all of them.
+struct AllSamples<'a, const N: usize, const S: usize> {
+    flock: Flock<'a, N, S>,
+    events: &'a [ScenarioEvent],
+    samples: u64,
+}
+
+impl<const N: usize, const S: usize> pulp::NullaryFnOnce for AllSamples<'_, N, S> {
+    type Output = Option<Vec<Seen>>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.flock.all_samples(self.events, self.samples)
+    }
+}
+
 impl<'a, const N: usize, const S: usize> Flock<'a, N, S> {
     /// Plants of these rigs and seeds, in the state of `start`.
     fn new(start: &ClosedLoop, rigs: &'a [(Arc<Network>, u64)], measurement: Measurement) -> Self {
@@ -98,7 +114,12 @@ impl<'a, const N: usize, const S: usize> Flock<'a, N, S> {
     }
 
     /// Runs all samples; `None` when a tank came to its rim or ran empty, or a command was refused.
-    fn run(mut self, events: &[ScenarioEvent], samples: u64) -> Option<Vec<Seen>> {
+    fn run(self, events: &'a [ScenarioEvent], samples: u64) -> Option<Vec<Seen>> {
+        pulp::Arch::new().dispatch(AllSamples { flock: self, events, samples })
+    }
+
+    #[inline(always)]
+    fn all_samples(mut self, events: &[ScenarioEvent], samples: u64) -> Option<Vec<Seen>> {
         let mut watch = Watch::new(samples, self.sample_time_s);
         let mut pending = events.iter().peekable();
         for sample in 0..samples {
