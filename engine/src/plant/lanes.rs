@@ -45,8 +45,6 @@ pub(crate) trait Number:
     fn is_below(self, bound: Self) -> bool;
     /// Whether it is at most as large as another in every plant; a NaN is not.
     fn is_at_most(self, most: Self) -> bool;
-    /// Smallest over the plants; NaN counts as −∞.
-    fn smallest(self) -> f64;
     /// Largest over the plants.
     fn largest(self) -> f64;
 }
@@ -107,11 +105,6 @@ impl Number for f64 {
     #[inline(always)]
     fn is_at_most(self, most: Self) -> bool {
         self <= most
-    }
-
-    #[inline(always)]
-    fn smallest(self) -> f64 {
-        if self.is_nan() { f64::NEG_INFINITY } else { self }
     }
 
     #[inline(always)]
@@ -275,11 +268,6 @@ impl Number for Pack {
     #[inline(always)]
     fn is_at_most(self, most: Self) -> bool {
         self.holds(most, |x, most| x <= most)
-    }
-
-    #[inline(always)]
-    fn smallest(self) -> f64 {
-        self.0.iter().fold(f64::INFINITY, |least, x| least.min(x.smallest()))
     }
 
     #[inline(always)]

@@ -54,6 +54,8 @@ pub(crate) struct Motion<const N: usize, const S: usize, V> {
     /// Levels of the nodes where the step began, and where it ends: the state of the integrator.
     pub(super) start: [V; N],
     pub end: [V; N],
+    /// Levels of the nodes now, in cm; of outside and floor, the volume in cm³.
+    pub now: [V; N],
     /// Length of the step and how much of it has passed, in seconds.
     pub(super) length_s: f64,
     pub(super) passed_s: f64,
@@ -145,6 +147,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
             spills_to: network.tanks.iter().map(|t| t.spills_to.unwrap_or(outside)).collect(),
             start: zero,
             end: zero,
+            now: zero,
             length_s: 0.0,
             passed_s: 0.0,
             start_flow: none,
@@ -176,6 +179,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         let early = |feed: &Feed| feed.source >= self.tanks || !self.streams.drives(feed.source);
         self.look_ahead = self.feeds.iter().all(early) && self.pipes.iter().all(|p| p.delay_s() > 0.0);
         self.no_step();
+        self.now = self.end;
         self.evaluate_end();
     }
 
@@ -194,6 +198,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
             return (duration_s, false);
         }
         let left_s = self.glide(duration_s);
+        self.arrive();
         (left_s, fed)
     }
 
@@ -202,10 +207,12 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     fn pumps_are_sure(&self, duration_s: f64) -> bool {
         // More than one pump may draw from a tank: as many times the flow is on the safe side.
         let sure_s = 2.0 * duration_s * self.feeds.len() as f64;
-        self.feeds.iter().zip(&self.commanded).all(|(feed, &flow)| {
-            feed.source >= self.tanks
-                || (self.present(feed.source) * self.areas[feed.source] - flow * sure_s).smallest() > SURE_CM3
-        })
+        let mut sure = true;
+        for (feed, &flow) in self.feeds.iter().zip(&self.commanded) {
+            let held = self.now[feed.source] * self.areas[feed.source];
+            sure &= feed.source >= self.tanks || V::of(SURE_CM3).is_below(held - flow * sure_s);
+        }
+        sure
     }
 
     /// Takes what the pumps draw in a sample out of its source and lets it into the air.
@@ -353,16 +360,21 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         }
     }
 
-    /// Ends the span at the present; gives the levels of all nodes.
+    /// Works out what the present is like, where the span ends.
     #[inline(always)]
-    pub fn end_span(&mut self) -> [V; N] {
+    fn arrive(&mut self) {
         if self.passed_s >= self.length_s {
             self.count_whole();
-            return self.end;
+            self.now = self.end;
+            return;
         }
-        let volume = self.present_volume();
+        // A cubic through both ends of the step.
+        let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
+        let volume = self
+            .streams
+            .each(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end);
         self.count(volume, self.passed_s);
-        self.after(&volume, self.passed_s)
+        self.now = self.after(&volume, self.passed_s);
     }
 
     /// Adds what has passed of the present step, all of it, to the volumes of the span.
@@ -397,28 +409,6 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         (self.counted, self.counted_s) = ([V::of(0.0); S], 0.0);
     }
 
-    /// What the streams have moved of the present step, which has not passed whole.
-    #[inline(always)]
-    fn present_volume(&self) -> [V; S] {
-        let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
-        self.streams
-            .each(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end)
-    }
-
-    /// Level of a node now, in cm; of outside and floor, the volume in cm³.
-    pub fn present(&self, node: usize) -> V {
-        self.presents()[node]
-    }
-
-    /// Levels of all nodes now.
-    #[inline(always)]
-    pub fn presents(&self) -> [V; N] {
-        if self.passed_s >= self.length_s {
-            return self.end;
-        }
-        self.after(&self.present_volume(), self.passed_s)
-    }
-
     /// Water in the air now, in cm³: what the present step has taken out of it beyond the present is still there.
     pub fn in_flight(&self) -> V {
         let ahead_s = self.length_s - self.passed_s;
@@ -430,7 +420,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     pub fn cut(&mut self) {
         let rest_s = self.length_s - self.passed_s;
         if rest_s > 0.0 {
-            self.end = self.presents();
+            self.end = self.now;
             for (pipe, &arriving) in self.pipes.iter_mut().zip(&self.arriving) {
                 if pipe.delay_s() > 0.0 {
                     pipe.give_back(rest_s, arriving);

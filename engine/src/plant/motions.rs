@@ -41,6 +41,21 @@ pub(super) struct Span<'a> {
     pub origins: &'a [Origin],
 }
 
+/// A span in the widest vector registers there are; the results are the same in all of them.
+struct Advance<'a, const N: usize, const S: usize> {
+    motion: &'a mut Motion<N, S, f64>,
+    duration_s: f64,
+}
+
+impl<const N: usize, const S: usize> pulp::NullaryFnOnce for Advance<'_, N, S> {
+    type Output = (f64, bool);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.motion.advance(self.duration_s)
+    }
+}
+
 impl Motions {
     pub fn new(network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
         Self::with_room(network.valves.len(), network, coefficients, pipes)
@@ -69,7 +84,7 @@ impl Motions {
         let mut made = Self::with_room(streams, network, coefficients, pipes);
         each!(&*self, old => each!(&mut made, new => {
             let nodes = network.tanks.len() + 2;
-            new.end[..nodes].copy_from_slice(&old.end[..nodes]);
+            new.end[..nodes].copy_from_slice(&old.now[..nodes]);
             let pumps = network.pumps.len();
             new.commanded[..pumps].copy_from_slice(&old.commanded[..pumps]);
             new.steps = old.steps;
@@ -77,16 +92,21 @@ impl Motions {
         made
     }
 
-    /// Lets `duration_s` pass; `levels_cm` gets the levels then.
-    #[inline]
-    pub fn advance(&mut self, network: &Network, duration_s: f64, levels_cm: &mut [f64], dry: &mut [bool]) {
+    /// Lets `duration_s` pass in the vector registers of `arch`; `levels_cm` gets the levels then.
+    pub fn advance(
+        &mut self,
+        arch: pulp::Arch,
+        network: &Network,
+        duration_s: f64,
+        levels_cm: &mut [f64],
+        dry: &mut [bool],
+    ) {
         each!(self, m => {
-            let (left_s, fed) = m.advance(duration_s);
+            let (left_s, fed) = arch.dispatch(Advance { motion: &mut **m, duration_s });
             if left_s > 0.0 {
                 m.advance_carefully(network, left_s, fed, dry);
             }
-            let levels = m.end_span();
-            levels_cm.copy_from_slice(&levels[..levels_cm.len()]);
+            levels_cm.copy_from_slice(&m.now[..levels_cm.len()]);
         });
     }
 
@@ -160,7 +180,7 @@ impl Motions {
 
     /// Volumes outside and on the floor, in cm³.
     pub fn lost_cm3(&self) -> (f64, f64) {
-        each!(self, m => (m.present(m.streams.outside()), m.present(m.streams.floor())))
+        each!(self, m => (m.now[m.streams.outside()], m.now[m.streams.floor()]))
     }
 
     pub fn set_lost_cm3(&mut self, outside: f64, floor: f64) {
@@ -168,6 +188,7 @@ impl Motions {
             m.cut();
             m.end[m.streams.outside()] = outside;
             m.end[m.streams.floor()] = floor;
+            m.now = m.end;
         });
     }
 

@@ -32,6 +32,7 @@ impl<const N: usize, const S: usize> Motion<N, S, f64> {
             let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(left_s, f64::min);
             left_s -= self.careful_step(network, change_s, fed, dry);
         }
+        self.now = self.end;
     }
 
     fn careful_step(&mut self, network: &Network, most_s: f64, fed: bool, dry: &mut [bool]) -> f64 {

@@ -270,9 +270,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             } else {
                 let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
                 nodes[from] += column[from] * volume;
-                if to != from {
-                    nodes[to] += column[to] * volume;
-                }
+                nodes[to] += column[to] * volume;
             }
         }
     }

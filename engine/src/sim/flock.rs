@@ -127,13 +127,13 @@ impl<'a, const N: usize, const S: usize> Flock<'a, N, S> {
             while let Some(event) = pending.next_if(|e| e.at_s <= now_s + 1e-9) {
                 self.apply(&event.command)?;
             }
-            let levels = self.motion.presents();
             for of_loop in &mut self.loops {
-                let flow = of_loop.sample(self.rigs, levels[of_loop.tank], self.measurement);
+                let level_cm = self.motion.now[of_loop.tank];
+                let flow = of_loop.sample(self.rigs, level_cm, self.measurement);
                 self.motion.commanded[of_loop.pump] = flow;
             }
             if let Some(first) = self.loops.first() {
-                watch.see(sample, first.setpoint_cm(), first.pv_cm, first.mv, levels[first.tank]);
+                watch.see(sample, first.setpoint_cm(), first.pv_cm, first.mv, self.motion.now[first.tank]);
             }
             if self.motion.advance(self.sample_time_s).0 > 0.0 {
                 return None;
