@@ -346,7 +346,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     pub(super) fn evaluate_end(&mut self) {
         self.heads = self.streams.heads(&self.end);
         let (flows, roots) = self.streams.flows(&self.heads, &self.roots);
-        self.roots.keep(&roots, self.streams.slots());
+        self.streams.keep(&roots, &mut self.roots);
         self.end_flow = flows;
         self.net = self.streams.drive(&self.end_flow, &[V::of(0.0); S]);
     }

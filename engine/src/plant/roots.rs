@@ -26,11 +26,19 @@ const SERIES: [f64; 8] = [
     16575.0 / 262_144.0,
 ];
 
-/// x^(−¼) and 1/x of every stream at some state.
-#[derive(Debug, Clone, Copy)]
+/// What x is made of for every stream: `x = bend·h² + round`.
+#[derive(Debug, Clone)]
+pub(crate) struct Bends<const S: usize, V> {
+    pub bend: [V; S],
+    pub round: [V; S],
+}
+
+/// x^(−¼) of every stream at some state, and what is left of `t = rest − fall·h²` by then.
+#[derive(Debug, Clone)]
 pub(crate) struct Roots<const S: usize, V> {
     root: [V; S],
-    inverse: [V; S],
+    rest: [V; S],
+    fall: [V; S],
 }
 
 /// (1 − t)^(−¼) for small t; summed pairwise, which is quicker than one after the other.
@@ -44,44 +52,39 @@ fn series<V: Number>(t: V) -> V {
 impl<const S: usize, V: Number> Roots<S, V> {
     /// Of no state: every other is too far.
     pub fn none() -> Self {
-        Self { root: [V::of(f64::NAN); S], inverse: [V::of(f64::NAN); S] }
+        let nothing = [V::of(f64::NAN); S];
+        Self { root: nothing, rest: nothing, fall: nothing }
     }
 
-    /// x^(−¼) of the first `count` streams.
+    /// x^(−¼) of the first `count` streams at these heads in cm.
     #[inline(always)]
-    pub fn at(&self, x: &[V; S], count: usize) -> [V; S] {
-        let (mut t, mut far) = ([V::of(0.0); S], V::of(0.0));
+    pub fn at(&self, heads: &[V; S], bends: &Bends<S, V>, count: usize) -> [V; S] {
+        let (mut roots, mut far) = ([V::of(0.0); S], V::of(0.0));
         for i in 0..count.min(S) {
-            t[i] = V::of(1.0) - x[i] * self.inverse[i];
-            far += t[i] * t[i];
+            let t = self.rest[i] - heads[i] * heads[i] * self.fall[i];
+            far += t * t;
+            roots[i] = self.root[i] * series(t);
         }
         if !far.is_below(V::of(NEAR)) {
-            return taken(x, count);
+            for i in 0..count.min(S) {
+                let x = heads[i] * heads[i] * bends.bend[i] + bends.round[i];
+                roots[i] = V::of(1.0) / x.sqrt().sqrt();
+            }
         }
-        for i in 0..count.min(S) {
-            t[i] = self.root[i] * series(t[i]);
-        }
-        t
+        roots
     }
 
     /// Goes on from these x^(−¼).
     #[inline(always)]
-    pub fn keep(&mut self, roots: &[V; S], count: usize) {
+    pub fn keep(&mut self, roots: &[V; S], bends: &Bends<S, V>, count: usize) {
         for i in 0..count.min(S) {
             let square = roots[i] * roots[i];
-            (self.root[i], self.inverse[i]) = (roots[i], square * square);
+            let inverse = square * square;
+            self.root[i] = roots[i];
+            self.rest[i] = V::of(1.0) - bends.round[i] * inverse;
+            self.fall[i] = bends.bend[i] * inverse;
         }
     }
-}
-
-/// The roots taken as such.
-#[inline(never)]
-fn taken<const S: usize, V: Number>(x: &[V; S], count: usize) -> [V; S] {
-    let mut roots = [V::of(0.0); S];
-    for i in 0..count.min(S) {
-        roots[i] = V::of(1.0) / x[i].sqrt().sqrt();
-    }
-    roots
 }
 
 #[cfg(test)]
@@ -90,13 +93,14 @@ mod tests {
 
     #[test]
     fn carried_roots_are_those_taken_anew() {
-        let (mut carried, mut worst) = (Roots::<2, f64>::none(), 0.0_f64);
+        let bends = Bends { bend: [1.0, 0.0], round: [0.0025, 1.0] };
+        let (mut carried, mut worst) = (Roots::none(), 0.0_f64);
         for i in 0..20_000_i32 {
-            let x = 1.0 + 0.99 * (f64::from(i) * 5e-3).sin();
-            let roots = carried.at(&[x, 1.0], 2);
-            carried.keep(&roots, 2);
-            worst = worst.max((roots[0] * x.powf(0.25) - 1.0).abs());
-            assert!(roots[1] == 1.0);
+            let head = 0.3 * (f64::from(i) * 5e-3).sin() + if i % 1000 < 500 { 0.0 } else { 5.0 };
+            let roots = carried.at(&[head, head], &bends, 2);
+            carried.keep(&roots, &bends, 2);
+            worst = worst.max((roots[0] * (head * head + 0.0025).powf(0.25) - 1.0).abs());
+            assert!(roots[1] == 1.0, "laminar");
         }
         assert!(worst < 1.5e-11, "{worst:e}");
     }

@@ -10,7 +10,7 @@
 use super::lanes::Number;
 use super::motion::{STEP_CURVATURE, STEP_ERROR_CM, STEP_RATE};
 use super::network::Network;
-use super::roots::Roots;
+use super::roots::{Bends, Roots};
 use super::spec::{ValveDrive, ValveLaw};
 
 /// δ² in cm² where δ = 0, so that a head of 0 has flow 0, not 0/0.
@@ -63,8 +63,7 @@ pub(crate) struct Streams<const N: usize, const S: usize, V> {
     square_roots: usize,
     k: [V; S],
     /// x of a stream is `bend·h² + round`, its flow `k·h·x^(−¼)`: 1 and δ² for a square root, 0 and 1 otherwise.
-    bend: [V; S],
-    round: [V; S],
+    bends: Bends<S, V>,
     /// k times the sum of 1/A over the nodes of the head, and its fourth power.
     steepness: [V; S],
     steepness4: [V; S],
@@ -95,8 +94,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             streams: Vec::with_capacity(S),
             square_roots: 0,
             k: zero,
-            bend: zero,
-            round: [V::of(1.0); S],
+            bends: Bends { bend: zero, round: [V::of(1.0); S] },
             steepness: zero,
             steepness4: zero,
             columns: Vec::with_capacity(S),
@@ -116,7 +114,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         self.columns.clear();
         self.origins.clear();
         (self.k, self.steepness, self.steepness4) = ([V::of(0.0); S], [V::of(0.0); S], [V::of(0.0); S]);
-        (self.bend, self.round) = ([V::of(0.0); S], [V::of(1.0); S]);
+        self.bends = Bends { bend: [V::of(0.0); S], round: [V::of(1.0); S] };
         self.valves(network, coefficients, ValveLaw::SquareRoot);
         for (tank, &k) in leaks.iter().enumerate() {
             if k.largest() > 0.0 {
@@ -124,8 +122,8 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             }
         }
         self.square_roots = self.streams.len();
-        self.bend[..self.square_roots].fill(V::of(1.0));
-        self.round[..self.square_roots].fill(V::of(self.delta2));
+        self.bends.bend[..self.square_roots].fill(V::of(1.0));
+        self.bends.round[..self.square_roots].fill(V::of(self.delta2));
         self.valves(network, coefficients, ValveLaw::Laminar);
         self.couple();
     }
@@ -228,8 +226,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     /// Flow of every stream in cm³/s, and x^(−¼), from those of heads near by.
     #[inline(always)]
     pub fn flows(&self, heads: &[V; S], near: &Roots<S, V>) -> ([V; S], [V; S]) {
-        let x = self.each(|i| heads[i] * heads[i] * self.bend[i] + self.round[i]);
-        let roots = near.at(&x, self.slots());
+        let roots = near.at(heads, &self.bends, self.slots());
         (self.each(|i| self.k[i] * heads[i] * roots[i]), roots)
     }
 
@@ -241,13 +238,21 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             self.bring(flows, &mut net);
             return self.each(|i| base[i] + self.streams[i].head(&net));
         };
-        let mut slope = *base;
+        // Two sums side by side, since an addition waits for the one before.
+        let (mut even, mut odd) = (*base, [V::of(0.0); S]);
         for j in 0..self.slots() {
+            let sum = if j % 2 == 0 { &mut even } else { &mut odd };
             for i in 0..self.slots() {
-                slope[i] += couplings[j][i] * flows[j];
+                sum[i] += couplings[j][i] * flows[j];
             }
         }
-        slope
+        self.each(|i| even[i] + odd[i])
+    }
+
+    /// Keeps x^(−¼), for flows near by.
+    #[inline(always)]
+    pub fn keep(&self, roots: &[V; S], kept: &mut Roots<S, V>) {
+        kept.keep(roots, &self.bends, self.slots());
     }
 
     /// Flow of every stream in cm³/s where nothing falls out of a tank that a stage of a step has taken below its floor.
@@ -288,7 +293,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
             let (change2, rate4) = (change * change, self.steepness4[i] * step4);
             // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
-            let scale = r2 * self.bend[i] + (V::of(1.0) - self.bend[i]);
+            let scale = r2 * self.bends.bend[i] + (V::of(1.0) - self.bends.bend[i]);
             let error2 = scale * scale * (STEP_ERROR_CM * STEP_ERROR_CM);
             worst = worst.larger(change2 - r2 * (STEP_CURVATURE * STEP_CURVATURE));
             worst = worst.larger(rate4 - scale * STEP_RATE.powi(4));
