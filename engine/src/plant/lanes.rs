@@ -113,16 +113,19 @@ impl Number for f64 {
     }
 }
 
-/// A number of each of four plants.
+/// Plants of a pack: two of the widest registers that are in use, so that one works while the other waits.
+const PLANTS: usize = 8;
+
+/// A number of each of as many plants.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
-pub(crate) struct Pack([f64; 4]);
+#[repr(align(64))]
+pub(crate) struct Pack([f64; PLANTS]);
 
 impl Pack {
     // Plain loops: `array::from_fn` is not always taken apart into vector instructions.
     #[inline(always)]
     fn each(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        for i in 0..4 {
+        for i in 0..PLANTS {
             self.0[i] = f(self.0[i], other.0[i]);
         }
         self
@@ -139,7 +142,7 @@ impl Pack {
     #[inline(always)]
     fn holds(self, other: Self, f: impl Fn(f64, f64) -> bool) -> bool {
         let mut all = true;
-        for i in 0..4 {
+        for i in 0..PLANTS {
             all &= f(self.0[i], other.0[i]);
         }
         all
@@ -209,11 +212,11 @@ impl SubAssign for Pack {
 }
 
 impl Number for Pack {
-    const PLANTS: usize = 4;
+    const PLANTS: usize = PLANTS;
 
     #[inline(always)]
     fn each_of(mut number: impl FnMut(usize) -> f64) -> Self {
-        let mut made = [0.0; 4];
+        let mut made = [0.0; PLANTS];
         for (plant, x) in made.iter_mut().enumerate() {
             *x = number(plant);
         }
@@ -227,7 +230,7 @@ impl Number for Pack {
 
     #[inline(always)]
     fn of(x: f64) -> Self {
-        Self([x; 4])
+        Self([x; PLANTS])
     }
 
     #[inline(always)]

@@ -64,8 +64,7 @@ pub(crate) struct Streams<const N: usize, const S: usize, V> {
     k: [V; S],
     /// x of a stream is `bend·h² + round`, its flow `k·h·x^(−¼)`: 1 and δ² for a square root, 0 and 1 otherwise.
     bends: Bends<S, V>,
-    /// k times the sum of 1/A over the nodes of the head, and its fourth power.
-    steepness: [V; S],
+    /// Fourth power of k times the sum of 1/A over the nodes of the head.
     steepness4: [V; S],
     /// dh/dt that a flow of 1 cm³/s of each stream brings every node, in cm⁻². Multiplying by whole columns is
     /// quicker than adding to single nodes, as long as they are short.
@@ -95,7 +94,6 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             square_roots: 0,
             k: zero,
             bends: Bends { bend: zero, round: [V::of(1.0); S] },
-            steepness: zero,
             steepness4: zero,
             columns: Vec::with_capacity(S),
             couplings: vec![zero; if S <= SHORT { S } else { 0 }],
@@ -113,7 +111,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         self.streams.clear();
         self.columns.clear();
         self.origins.clear();
-        (self.k, self.steepness, self.steepness4) = ([V::of(0.0); S], [V::of(0.0); S], [V::of(0.0); S]);
+        (self.k, self.steepness4) = ([V::of(0.0); S], [V::of(0.0); S]);
         self.bends = Bends { bend: [V::of(0.0); S], round: [V::of(1.0); S] };
         self.valves(network, coefficients, ValveLaw::SquareRoot);
         for (tank, &k) in leaks.iter().enumerate() {
@@ -155,8 +153,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         let slot = self.streams.len();
         let steepness = k * (self.per_area[from] + self.per_area[against]);
         let steepness2 = steepness * steepness;
-        (self.k[slot], self.steepness[slot]) = (k, steepness);
-        self.steepness4[slot] = steepness2 * steepness2;
+        (self.k[slot], self.steepness4[slot]) = (k, steepness2 * steepness2);
         let mut column = [V::of(0.0); N];
         column[from] -= self.per_area[from];
         column[to] += self.per_area[to];
@@ -304,21 +301,22 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
 
     #[inline(never)]
     fn count_pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
-        let mut worst = 1.0_f64;
+        let (mut bend2, mut rate4, mut error2) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let step4 = step_s * step_s * step_s * step_s;
         for i in 0..self.streams.len().min(S) {
             let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
-            let (change2, steepest) = (change * change, self.steepness[i] * step_s);
-            worst = worst.max((change2 / r2).largest().sqrt() / STEP_CURVATURE);
-            let linear = i >= self.square_roots;
-            let steepest2 = steepest * steepest;
-            let rate2 = if linear { steepest2 } else { steepest2 / r2.sqrt() };
+            let (change2, linear) = (change * change, i >= self.square_roots);
+            bend2 = bend2.max((change2 / r2).largest());
+            let steep4 = self.steepness4[i] * step4;
+            let rated4 = if linear { steep4 } else { steep4 / r2 };
+            error2 = error2.max((rated4 * rated4 * change2).largest());
             // An empty tank with δ = 0 that stays empty needs no steps for its slope.
             if linear || self.delta2 > TINY_CM2 || change2.largest() > 0.0 {
-                worst = worst.max(rate2.largest().sqrt() / STEP_RATE);
+                rate4 = rate4.max(rated4.largest());
             }
-            let error_cm = (rate2 * rate2 * rate2 * rate2 * change2).largest().sqrt();
-            worst = worst.max((error_cm / STEP_ERROR_CM).powf(0.2));
         }
-        worst
+        let worst = (bend2.sqrt() / STEP_CURVATURE).max(rate4.sqrt().sqrt() / STEP_RATE).max(1.0);
+        let error_cm = error2.sqrt();
+        if error_cm > STEP_ERROR_CM { worst.max((error_cm / STEP_ERROR_CM).powf(0.2)) } else { worst }
     }
 }
