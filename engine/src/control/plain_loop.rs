@@ -116,3 +116,61 @@ impl<V: Number> PlainLoop<V> {
         wanted
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{LoopInput, LoopSpec, OutputRange, PidGains};
+
+    fn one(options: LoopOptions) -> ControlLoop {
+        let spec = LoopSpec {
+            id: "LIC-02".to_owned(),
+            sensor: "LT02".to_owned(),
+            pump: Some("BA01".to_owned()),
+            cascade_to: None,
+            setpoint_cm: 15.0,
+            mode: Mode::Automatic,
+            law: Law::default(),
+            options,
+            pv_filter_s: 0.0,
+            kc: Some(1.8),
+            ti_s: Some(152.0),
+            gains: None,
+            td_s: 2.0,
+            n: 10.0,
+            b: 1.0,
+            c: 0.0,
+        };
+        ControlLoop::new(&spec, 0.2, OutputRange { low: 1.0, high: 3.5, rate_per_s: 2.0 }, 2.0)
+    }
+
+    #[test]
+    fn it_does_what_the_loop_of_one_plant_does_to_the_last_bit() {
+        let mut alone = one(LoopOptions::default());
+        let mut plain = PlainLoop::<f64>::of(&alone).expect("a plain loop");
+        for sample in 0..3000_u32 {
+            if sample == 1000 {
+                let tuning = PidTuning::new(PidGains::pid(7.0, 15.0, 1.0));
+                alone.set_tuning(tuning);
+                plain.set_tuning(tuning);
+                alone.set_pv_filter(1.5);
+                plain.set_pv_filter(1.5);
+                (alone.setpoint_cm, plain.setpoint_cm) = (16.0, 16.0);
+            }
+            let pv_cm = 15.0 + (f64::from(sample) * 0.7).sin() * f64::from(sample % 37) * 0.01;
+            let input = LoopInput { pv_cm, disturbance: f64::NAN, actual: Mode::Automatic, blocked: None };
+            let mv = alone.update(&input).mv;
+            assert!(plain.update(pv_cm).to_bits() == mv.to_bits(), "sample {sample}: {} {mv}", plain.mv);
+        }
+    }
+
+    #[test]
+    fn what_has_more_around_it_is_no_plain_loop() {
+        let ramp = crate::control::SetpointPath { ramp_cm_s: Some(0.1), filter_s: 0.0 };
+        let options = LoopOptions { setpoint: ramp, ..LoopOptions::default() };
+        assert!(PlainLoop::<f64>::of(&one(options)).is_none());
+        let mut manual = one(LoopOptions::default());
+        manual.mode = Mode::Manual;
+        assert!(PlainLoop::<f64>::of(&manual).is_none());
+    }
+}

@@ -390,8 +390,8 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         if new_s <= 0.0 || !self.counts {
             return;
         }
-        for i in 0..self.streams.slots() {
-            self.span_volume[i] += volume[i] - self.counted[i];
+        for (sum, (&volume, &counted)) in self.span_volume.iter_mut().zip(volume.iter().zip(&self.counted)) {
+            *sum += volume - counted;
         }
         for i in 0..self.feeds.len() {
             self.span_arriving[i & (N - 1)] += self.arriving[i & (N - 1)] * new_s;

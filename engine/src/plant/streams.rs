@@ -204,8 +204,8 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     #[inline(always)]
     pub fn each(&self, stream: impl Fn(usize) -> V) -> [V; S] {
         let mut made = [V::of(0.0); S];
-        for i in 0..self.slots() {
-            made[i] = stream(i);
+        for (i, made) in made.iter_mut().enumerate().take(self.slots()) {
+            *made = stream(i);
         }
         made
     }

@@ -14,7 +14,7 @@ use crate::session::RigCommand;
 /// The controllers of a loop.
 enum Steering {
     /// All plants at once.
-    Plain(PlainLoop<Pack>),
+    Plain(Box<PlainLoop<Pack>>),
     /// Plant by plant.
     Each(Vec<ControlLoop>),
 }
@@ -55,7 +55,7 @@ impl FlockLoop {
             pump: active.pump,
             law: *active.control.law(),
             steering: match PlainLoop::of(&active.control) {
-                Some(plain) => Steering::Plain(plain),
+                Some(plain) => Steering::Plain(Box::new(plain)),
                 None => Steering::Each(vec![active.control.clone(); Pack::PLANTS]),
             },
             transmitter: Transmitter::new(&sensor.spec, converters, spec.sample_time_s),
