@@ -48,20 +48,20 @@ pub struct LoopInput {
 /// A loop in operation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControlLoop {
-    running: Running,
+    pub(super) running: Running,
     law: Law,
     tuning: PidTuning,
     options: LoopOptions,
-    sample_time_s: f64,
+    pub(super) sample_time_s: f64,
     range: OutputRange,
     limits: Limits,
-    most_per_sample: f64,
+    pub(super) most_per_sample: f64,
     /// Setpoint in cm that the operator or the outer loop gave.
     pub setpoint_cm: f64,
     /// Mode that was asked for.
     pub mode: Mode,
     pv_filter_s: f64,
-    filtered_pv: Option<f64>,
+    pub(super) filtered_pv: Option<f64>,
     shaper: SetpointShaper,
     lead_lag: LeadLag,
     smith: Option<SmithPredictor>,

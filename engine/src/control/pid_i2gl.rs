@@ -28,14 +28,14 @@ use super::tuning::PidTuning;
 pub struct PidI2gl {
     tuning: PidTuning,
     sampled: Sampled,
-    clip: Clip,
+    pub(super) clip: Clip,
     sample_time_s: f64,
     limits: Limits,
     mv: f64,
     /// Sum of the increments where only the integral is clipped.
     sum: f64,
-    derivative: f64,
-    last: Option<Signals>,
+    pub(super) derivative: f64,
+    pub(super) last: Option<Signals>,
     last_feedforward: Option<f64>,
 }
 

@@ -4,5 +4,5 @@ mod simulated;
 mod source;
 
 pub use simulated::SimulatedRig;
-pub(crate) use simulated::{MISHAPS, convert};
+pub(crate) use simulated::{convert, noise_of};
 pub use source::{RigControls, Source};

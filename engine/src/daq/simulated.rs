@@ -9,7 +9,7 @@ use crate::plant::spec::ConverterSpec;
 
 use super::source::{RigControls, Source};
 use crate::plant::{
-    ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Plant, Pump, Reading, RigError,
+    ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Number, Plant, Pump, Reading, RigError,
     Transmitter, check_fault, nearest,
 };
 
@@ -21,14 +21,21 @@ pub struct SimulatedRig {
     measurement: Measurement,
     dac_step: Option<f64>,
     written: Vec<f64>,
-    rng: Xoshiro256PlusPlus,
+    /// A source of noise for each sensor.
+    noise: Vec<Xoshiro256PlusPlus>,
     mishaps: Xoshiro256PlusPlus,
     faults: Vec<ActiveFault>,
     powered: bool,
 }
 
-/// Tells the source of spikes from that of noise.
-pub(crate) const MISHAPS: u64 = 0x005b_1ce5;
+/// Tells the source of spikes from those of noise.
+const MISHAPS: u64 = 0x005b_1ce5;
+
+/// The source of a sensor's noise: one of its own, so that no sensor's noise depends on who reads another.
+pub(crate) fn noise_of(sensor: usize, seed: u64) -> Xoshiro256PlusPlus {
+    // 2⁶⁴ over the golden ratio keeps the seeds of neighbours apart.
+    Xoshiro256PlusPlus::seed_from_u64(seed ^ (sensor as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
 
 impl SimulatedRig {
     /// A rig at the state of its file.
@@ -42,6 +49,7 @@ impl SimulatedRig {
             .iter()
             .map(|s| Transmitter::new(&s.spec, converters, network.spec.sample_time_s))
             .collect();
+        let noise = (0..network.sensors.len()).map(|sensor| noise_of(sensor, seed)).collect();
         let dac_step = converters.map(ConverterSpec::dac_step_v);
         let plant = Plant::new(network)?;
         Ok(Self {
@@ -50,7 +58,7 @@ impl SimulatedRig {
             transmitters,
             measurement,
             dac_step,
-            rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+            noise,
             mishaps: Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS),
             faults: vec![],
             powered: true,
@@ -76,13 +84,19 @@ impl SimulatedRig {
     }
 }
 
-/// An output within its rate and range, and as the converter of that step gives it to the pump.
-#[inline]
-pub(crate) fn convert(pump: &Pump, sample_time_s: f64, step: Option<f64>, last: f64, mv: f64) -> (f64, f64) {
-    let most = pump.rate_limit_per_s * sample_time_s;
-    let limited =
-        if mv.is_finite() { mv.clamp(last - most, last + most).clamp(pump.min, pump.max) } else { mv };
-    (limited, step.map_or(limited, |step| nearest(limited / step) * step))
+/// An output, a number, within its rate and range, and as the converter of that step gives it to the pump.
+#[inline(always)]
+pub(crate) fn convert<V: Number>(
+    pump: &Pump,
+    sample_time_s: f64,
+    step: Option<f64>,
+    last: V,
+    mv: V,
+) -> (V, V) {
+    let most = V::of(pump.rate_limit_per_s * sample_time_s);
+    let slow = mv.larger(last - most).smaller(last + most);
+    let limited = slow.larger(V::of(pump.min)).smaller(V::of(pump.max));
+    (limited, step.map_or(limited, |step| nearest(limited * (1.0 / step)) * step))
 }
 
 impl Source for SimulatedRig {
@@ -91,23 +105,21 @@ impl Source for SimulatedRig {
     }
 
     fn read(&mut self, readings: &mut [Reading]) {
-        for (i, transmitter) in self.transmitters.iter_mut().enumerate() {
-            let level_cm = self.plant.levels_cm()[self.plant.network().sensors[i].tank];
-            readings[i] = transmitter.measure(
-                level_cm,
-                self.measurement,
-                self.powered,
-                &mut self.rng,
-                &mut self.mishaps,
-            );
+        let sensors = self.plant.network().sensors.iter().zip(&mut self.transmitters).zip(&mut self.noise);
+        for (reading, ((sensor, transmitter), noise)) in readings.iter_mut().zip(sensors) {
+            let level_cm = self.plant.levels_cm()[sensor.tank];
+            *reading =
+                transmitter.measure(level_cm, self.measurement, self.powered, noise, &mut self.mishaps);
         }
     }
 
     fn write(&mut self, pump: usize, mv: f64) -> Result<f64, RigError> {
         let network = self.plant.network();
+        let (of, sample_time_s) = (&network.pumps[pump], network.spec.sample_time_s);
         let step = self.dac_step.filter(|_| self.measurement.quantisation);
+        // What is no number, the plant refuses.
         let (limited, converted) =
-            convert(&network.pumps[pump], network.spec.sample_time_s, step, self.written[pump], mv);
+            if mv.is_finite() { convert(of, sample_time_s, step, self.written[pump], mv) } else { (mv, mv) };
         self.plant.set_input(pump, converted)?;
         self.written[pump] = limited;
         Ok(limited)
@@ -174,7 +186,9 @@ impl RigControls for SimulatedRig {
     }
 
     fn set_seed(&mut self, seed: u64) {
-        self.rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        for (sensor, noise) in self.noise.iter_mut().enumerate() {
+            *noise = noise_of(sensor, seed);
+        }
         self.mishaps = Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS);
     }
 

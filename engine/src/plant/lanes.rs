@@ -1,7 +1,7 @@
 //! Numbers of one plant, or of several plants side by side.
 //!
 //! The integrator is written once for both: with `f64` it moves one plant, with [`Pack`] several at a time, whose
-//! arithmetic the compiler turns into vector instructions.
+//! arithmetic is that of vector registers.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -31,10 +31,20 @@ pub(crate) trait Number:
     fn of_plant(&self, plant: usize) -> f64;
     /// Square root.
     fn sqrt(self) -> Self;
-    /// The larger of both, plant by plant.
+    /// The larger of both, plant by plant; a NaN stays one.
     fn at_least(self, least: f64) -> Self;
-    /// Smallest over the plants; NaN counts as −∞.
-    fn smallest(self) -> f64;
+    /// The larger of two, plant by plant.
+    fn larger(self, other: Self) -> Self;
+    /// The smaller of two, plant by plant.
+    fn smaller(self, other: Self) -> Self;
+    /// |x|.
+    fn abs(self) -> Self;
+    /// 0 where it is not finite.
+    fn finite_or_zero(self) -> Self;
+    /// Whether it is below another in every plant; a NaN is not.
+    fn is_below(self, bound: Self) -> bool;
+    /// Whether it is at most as large as another in every plant; a NaN is not.
+    fn is_at_most(self, most: Self) -> bool;
     /// Largest over the plants.
     fn largest(self) -> f64;
 }
@@ -64,12 +74,37 @@ impl Number for f64 {
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        self.max(least)
+        if self < least { least } else { self }
     }
 
     #[inline(always)]
-    fn smallest(self) -> f64 {
-        if self.is_nan() { f64::NEG_INFINITY } else { self }
+    fn larger(self, other: Self) -> Self {
+        if self < other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self > other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+
+    #[inline(always)]
+    fn finite_or_zero(self) -> Self {
+        if self.is_finite() { self } else { 0.0 }
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: Self) -> bool {
+        self < bound
+    }
+
+    #[inline(always)]
+    fn is_at_most(self, most: Self) -> bool {
+        self <= most
     }
 
     #[inline(always)]
@@ -78,16 +113,19 @@ impl Number for f64 {
     }
 }
 
-/// A number of each of `L` plants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
-pub(crate) struct Pack<const L: usize>(pub [f64; L]);
+/// Plants of a pack: two of the widest registers that are in use, so that one works while the other waits.
+const PLANTS: usize = 8;
 
-impl<const L: usize> Pack<L> {
+/// A number of each of as many plants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Pack([f64; PLANTS]);
+
+impl Pack {
+    // Plain loops: `array::from_fn` is not always taken apart into vector instructions.
     #[inline(always)]
     fn each(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        // A plain loop: `array::from_fn` is not always taken apart into vector instructions.
-        for i in 0..L {
+        for i in 0..PLANTS {
             self.0[i] = f(self.0[i], other.0[i]);
         }
         self
@@ -100,9 +138,18 @@ impl<const L: usize> Pack<L> {
         }
         self
     }
+
+    #[inline(always)]
+    fn holds(self, other: Self, f: impl Fn(f64, f64) -> bool) -> bool {
+        let mut all = true;
+        for i in 0..PLANTS {
+            all &= f(self.0[i], other.0[i]);
+        }
+        all
+    }
 }
 
-impl<const L: usize> Add for Pack<L> {
+impl Add for Pack {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -110,7 +157,7 @@ impl<const L: usize> Add for Pack<L> {
     }
 }
 
-impl<const L: usize> Sub for Pack<L> {
+impl Sub for Pack {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -118,7 +165,7 @@ impl<const L: usize> Sub for Pack<L> {
     }
 }
 
-impl<const L: usize> Mul for Pack<L> {
+impl Mul for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -126,7 +173,7 @@ impl<const L: usize> Mul for Pack<L> {
     }
 }
 
-impl<const L: usize> Div for Pack<L> {
+impl Div for Pack {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -134,7 +181,7 @@ impl<const L: usize> Div for Pack<L> {
     }
 }
 
-impl<const L: usize> Mul<f64> for Pack<L> {
+impl Mul<f64> for Pack {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
@@ -142,7 +189,7 @@ impl<const L: usize> Mul<f64> for Pack<L> {
     }
 }
 
-impl<const L: usize> Neg for Pack<L> {
+impl Neg for Pack {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -150,26 +197,30 @@ impl<const L: usize> Neg for Pack<L> {
     }
 }
 
-impl<const L: usize> AddAssign for Pack<L> {
+impl AddAssign for Pack {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const L: usize> SubAssign for Pack<L> {
+impl SubAssign for Pack {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl<const L: usize> Number for Pack<L> {
-    const PLANTS: usize = L;
+impl Number for Pack {
+    const PLANTS: usize = PLANTS;
 
     #[inline(always)]
-    fn each_of(number: impl FnMut(usize) -> f64) -> Self {
-        Self(std::array::from_fn(number))
+    fn each_of(mut number: impl FnMut(usize) -> f64) -> Self {
+        let mut made = [0.0; PLANTS];
+        for (plant, x) in made.iter_mut().enumerate() {
+            *x = number(plant);
+        }
+        Self(made)
     }
 
     #[inline(always)]
@@ -179,7 +230,7 @@ impl<const L: usize> Number for Pack<L> {
 
     #[inline(always)]
     fn of(x: f64) -> Self {
-        Self([x; L])
+        Self([x; PLANTS])
     }
 
     #[inline(always)]
@@ -189,24 +240,41 @@ impl<const L: usize> Number for Pack<L> {
 
     #[inline(always)]
     fn at_least(self, least: f64) -> Self {
-        self.all(|x| x.max(least))
+        self.all(|x| x.at_least(least))
     }
 
     #[inline(always)]
-    fn smallest(self) -> f64 {
-        let mut least = f64::INFINITY;
-        for x in self.0 {
-            least = least.min(x.smallest());
-        }
-        least
+    fn larger(self, other: Self) -> Self {
+        self.each(other, f64::larger)
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.each(other, f64::smaller)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.all(f64::abs)
+    }
+
+    #[inline(always)]
+    fn finite_or_zero(self) -> Self {
+        self.all(f64::finite_or_zero)
+    }
+
+    #[inline(always)]
+    fn is_below(self, bound: Self) -> bool {
+        self.holds(bound, |x, bound| x < bound)
+    }
+
+    #[inline(always)]
+    fn is_at_most(self, most: Self) -> bool {
+        self.holds(most, |x, most| x <= most)
     }
 
     #[inline(always)]
     fn largest(self) -> f64 {
-        let mut most = f64::NEG_INFINITY;
-        for x in self.0 {
-            most = most.max(x);
-        }
-        most
+        self.0.iter().fold(f64::NEG_INFINITY, |most, &x| most.max(x))
     }
 }

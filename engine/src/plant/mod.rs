@@ -4,6 +4,7 @@
 //! volume of every stream over a step and moves exactly that volume, so that water is conserved to
 //! rounding. Units: cm, s, cm², cm³/s. Inputs that are not finite are refused before they reach a state.
 
+mod curve;
 mod error;
 mod faults;
 mod flow_law;
@@ -18,6 +19,7 @@ mod network;
 mod pipe;
 mod pump_curve;
 mod rims;
+mod roots;
 mod sensor;
 pub mod spec;
 mod state;

@@ -1,10 +1,10 @@
 //! The integrator: classical Runge–Kutta in flux form, from one change of a delayed stream to the next.
 //!
 //! A step sums the volume of every stream and moves exactly that volume, so that what leaves one tank arrives in
-//! the other. A sample that falls into a step is read from the cubic through both its ends (Hermite), for which the
-//! slopes are there anyway: the flows of the valves do not jump when a stream in the air changes, only what arrives
-//! does. The cubic keeps every balance that both ends keep. Where all pumps have a transport delay, a step may so
-//! reach beyond the present sample; anything that is changed by hand cuts it there.
+//! the other. A sample that falls into a step is read from the cubic of every stream's volume through both its ends
+//! (Hermite), for which the flows are there anyway; levels follow from those volumes, so that the water adds up there too.
+//! Where all pumps have a transport delay, a step may so reach beyond the present sample; anything that is changed by hand
+//! cuts it there.
 //!
 //! That holds while no tank is at its rim or empty; there the steps end at the samples and [`super::rims`] mends
 //! the volumes.
@@ -12,6 +12,7 @@
 use super::lanes::Number;
 use super::network::{Network, Pump};
 use super::pipe::Pipe;
+use super::roots::Roots;
 use super::streams::Streams;
 
 /// Largest λ·h of a step, well inside the stability region of the method (2.78).
@@ -35,44 +36,50 @@ pub(super) struct Feed {
     pub outlets: Vec<(usize, f64)>,
 }
 
-/// Levels, streams and what is in the air; `N` is the length of every array (see [`super::streams`]).
+/// Levels, streams and what is in the air; `N` and `S` are the lengths of arrays (see [`super::streams`]).
 #[derive(Debug, Clone)]
-pub(crate) struct Motion<const N: usize, V> {
-    pub streams: Streams<N, V>,
+pub(crate) struct Motion<const N: usize, const S: usize, V> {
+    pub streams: Streams<N, S, V>,
     pub pipes: Vec<Pipe<V>>,
     pub(super) feeds: Vec<Feed>,
     /// Flow each pump draws, in cm³/s.
     pub commanded: [V; N],
     /// Steps may reach beyond the present: all that arrives until then is in the air already.
     pub(super) look_ahead: bool,
-    tanks: usize,
-    heights: [V; N],
-    areas: [V; N],
+    pub(super) tanks: usize,
+    pub(super) heights: [V; N],
+    pub(super) areas: [V; N],
     /// Node that takes each tank's spill.
-    spills_to: Vec<usize>,
+    pub(super) spills_to: Vec<usize>,
     /// Levels of the nodes where the step began, and where it ends: the state of the integrator.
     pub(super) start: [V; N],
     pub end: [V; N],
-    /// dh/dt at both ends, in cm/s.
-    pub(super) start_slope: [V; N],
-    end_slope: [V; N],
+    /// Levels of the nodes now, in cm; of outside and floor, the volume in cm³.
+    pub now: [V; N],
     /// Length of the step and how much of it has passed, in seconds.
     pub(super) length_s: f64,
     pub(super) passed_s: f64,
     /// Flow of every stream at both ends in cm³/s, and its volume in cm³.
-    pub(super) start_flow: [V; N],
-    pub(super) end_flow: [V; N],
-    pub(super) volume: [V; N],
-    /// dh/dt that the streams bring each node at the end, and pumps in the step, in cm/s.
-    pub(super) end_net: [V; N],
+    pub(super) start_flow: [V; S],
+    pub(super) end_flow: [V; S],
+    pub(super) volume: [V; S],
+    /// Head of every stream at the end in cm, and the slope that the streams bring it, in cm/s.
+    heads: [V; S],
+    net: [V; S],
+    /// What the flows at the end came from: those of the next step are near.
+    roots: Roots<S, V>,
+    /// dh/dt that pumps bring each node in the step, and each head, in cm/s.
     pub(super) inflow: [V; N],
+    head_inflow: [V; S],
     /// What arrives from each pump in the step, in cm³/s.
     pub(super) arriving: [V; N],
     /// What of the present step's volumes earlier spans have counted.
-    counted: [V; N],
+    counted: [V; S],
     counted_s: f64,
+    /// Whether spans are counted.
+    pub counts: bool,
     /// Volumes of the span that [`Self::advance`] covered: of streams, from pumps, of what arrived, over rims.
-    pub span_volume: [V; N],
+    pub span_volume: [V; S],
     pub span_pumped: [V; N],
     pub span_arriving: [V; N],
     pub span_spills: [V; N],
@@ -116,11 +123,11 @@ fn nodes<const N: usize, V: Number>(node: impl Fn(usize) -> V) -> [V; N] {
     made
 }
 
-impl<const N: usize, V: Number> Motion<N, V> {
+impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     /// A rig at rest with everything empty; `areas_cm2` of the tanks, `coefficients` of the valves.
     pub fn new(network: &Network, areas_cm2: &[V], coefficients: &[V], pipes: Vec<Pipe<V>>) -> Self {
         let tanks = network.tanks.len();
-        let zero = [V::of(0.0); N];
+        let (zero, none) = ([V::of(0.0); N], [V::of(0.0); S]);
         let streams = Streams::new(network, areas_cm2, coefficients, &vec![V::of(0.0); tanks]);
         let outside = streams.outside();
         let feed = |p: &Pump| Feed { source: p.from.unwrap_or(outside), outlets: p.outlets.clone() };
@@ -140,19 +147,22 @@ impl<const N: usize, V: Number> Motion<N, V> {
             spills_to: network.tanks.iter().map(|t| t.spills_to.unwrap_or(outside)).collect(),
             start: zero,
             end: zero,
-            start_slope: zero,
-            end_slope: zero,
+            now: zero,
             length_s: 0.0,
             passed_s: 0.0,
-            start_flow: zero,
-            end_flow: zero,
-            volume: zero,
-            end_net: zero,
+            start_flow: none,
+            end_flow: none,
+            volume: none,
+            heads: none,
+            net: none,
+            roots: Roots::none(),
             inflow: zero,
+            head_inflow: none,
             arriving: zero,
-            counted: zero,
+            counted: none,
             counted_s: 0.0,
-            span_volume: zero,
+            counts: true,
+            span_volume: none,
             span_pumped: zero,
             span_arriving: zero,
             span_spills: zero,
@@ -169,11 +179,13 @@ impl<const N: usize, V: Number> Motion<N, V> {
         let early = |feed: &Feed| feed.source >= self.tanks || !self.streams.drives(feed.source);
         self.look_ahead = self.feeds.iter().all(early) && self.pipes.iter().all(|p| p.delay_s() > 0.0);
         self.no_step();
+        self.now = self.end;
         self.evaluate_end();
     }
 
     /// Lets `duration_s` pass with constant inputs while no tank gets to its rim or empty. Gives the time that is left
     /// where one does, and whether the pumps have had their water for it.
+    #[inline(always)]
     pub fn advance(&mut self, duration_s: f64) -> (f64, bool) {
         let fed = self.look_ahead && self.pumps_are_sure(duration_s);
         if self.look_ahead && !fed {
@@ -186,20 +198,25 @@ impl<const N: usize, V: Number> Motion<N, V> {
             return (duration_s, false);
         }
         let left_s = self.glide(duration_s);
+        self.arrive();
         (left_s, fed)
     }
 
     /// Whether every tank that pumps draw from has water for them without a look at the step.
+    #[inline(always)]
     fn pumps_are_sure(&self, duration_s: f64) -> bool {
         // More than one pump may draw from a tank: as many times the flow is on the safe side.
         let sure_s = 2.0 * duration_s * self.feeds.len() as f64;
-        self.feeds.iter().zip(&self.commanded).all(|(feed, &flow)| {
-            feed.source >= self.tanks
-                || (self.present(feed.source) * self.areas[feed.source] - flow * sure_s).smallest() > SURE_CM3
-        })
+        let mut sure = true;
+        for (feed, &flow) in self.feeds.iter().zip(&self.commanded) {
+            let held = self.now[feed.source] * self.areas[feed.source];
+            sure &= feed.source >= self.tanks || V::of(SURE_CM3).is_below(held - flow * sure_s);
+        }
+        sure
     }
 
     /// Takes what the pumps draw in a sample out of its source and lets it into the air.
+    #[inline(always)]
     fn feed(&mut self, duration_s: f64) {
         for (i, feed) in self.feeds.iter().enumerate() {
             let flow = self.commanded[i];
@@ -212,6 +229,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
     }
 
     /// Goes on in whole steps until `duration_s` lies in one; gives the time left when a tank stands in the way.
+    #[inline(always)]
     fn glide(&mut self, duration_s: f64) -> f64 {
         let mut left_s = duration_s;
         loop {
@@ -229,27 +247,21 @@ impl<const N: usize, V: Number> Motion<N, V> {
     }
 
     /// Takes the next step; false when a tank would pass its rim or its floor, and then nothing has changed.
+    #[inline(always)]
     fn begin_step(&mut self, longest_s: f64, left_s: f64) -> bool {
         self.count_whole();
         let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(longest_s, f64::min);
         let most_s = if self.look_ahead { change_s } else { change_s.min(left_s) };
         self.prepare_step();
-        let step_s = self.length_for(most_s, MOST_PIECES);
-        self.runge_kutta::<false>(step_s);
-        let inside = self
-            .end
-            .iter()
-            .zip(&self.heights)
-            .take(self.tanks)
-            .all(|(&level, &height)| level.smallest() >= 0.0 && (height - level).smallest() >= 0.0);
-        if !inside {
+        let slope = self.streams.each(|i| self.net[i] + self.head_inflow[i]);
+        let step_s = self.length_for(&slope, most_s, MOST_PIECES);
+        self.runge_kutta(slope, step_s);
+        if !self.is_inside() {
             (self.end, self.end_flow) = (self.start, self.start_flow);
-            self.evaluate_end();
             self.no_step();
             return false;
         }
         self.evaluate_end();
-        self.end_slope = nodes(|i| self.end_net[i] + self.inflow[i]);
         self.no_step();
         self.length_s = step_s;
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
@@ -262,20 +274,35 @@ impl<const N: usize, V: Number> Motion<N, V> {
         true
     }
 
+    /// Whether every tank can hold and give what the step moves.
+    #[inline(always)]
+    fn is_inside(&self) -> bool {
+        let (mut room, mut sum) = (V::of(f64::INFINITY), V::of(0.0));
+        for (&level, &height) in self.end.iter().zip(&self.heights).take(self.tanks) {
+            room = room.smaller(level).smaller(height - level);
+            sum += level;
+        }
+        // The sum finds a level that is no number.
+        (sum * 0.0).is_at_most(room)
+    }
+
     /// Starts a step at the present end.
+    #[inline(always)]
     pub(super) fn prepare_step(&mut self) {
         self.set_inflow();
         (self.start, self.start_flow) = (self.end, self.end_flow);
-        self.start_slope = nodes(|i| self.end_net[i] + self.inflow[i]);
     }
 
-    /// Length of a step of at most `most_s` that resolves every stream from `start`.
-    pub(super) fn length_for(&self, most_s: f64, most_pieces: f64) -> f64 {
-        let pieces = self.streams.pieces(&self.start, &self.start_slope, most_s);
+    /// Length of a step of at most `most_s` that resolves every stream from the present end, where the heads have this
+    /// slope.
+    #[inline(always)]
+    pub(super) fn length_for(&self, slope: &[V; S], most_s: f64, most_pieces: f64) -> f64 {
+        let pieces = self.streams.pieces(&self.heads, slope, most_s);
         if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(most_pieces) } else { most_s }
     }
 
     /// What pumps bring each node from now to the next change in the air.
+    #[inline(always)]
     fn set_inflow(&mut self) {
         self.inflow = [V::of(0.0); N];
         for (i, feed) in self.feeds.iter().enumerate() {
@@ -288,84 +315,83 @@ impl<const N: usize, V: Number> Motion<N, V> {
                 self.inflow[feed.source] -= self.commanded[i] * self.streams.per_area[feed.source];
             }
         }
+        self.head_inflow = self.streams.heads(&self.inflow);
     }
 
-    /// One step from `start`, whose slope and flows are there; gives `end` and the volume of every stream.
+    /// One step from `start`, whose flows are there and where the heads have this slope; gives `end` and the volume of
+    /// every stream.
     #[inline(always)]
-    pub(super) fn runge_kutta<const GUARD: bool>(&mut self, h: f64) {
-        self.volume = self.start_flow;
-        let mut slope = self.start_slope;
+    fn runge_kutta(&mut self, mut slope: [V; S], h: f64) {
+        let mut sum = self.start_flow;
         for (share, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            let stage: [V; N] = nodes(|i| self.start[i] + slope[i] * (share * h));
-            slope = self.streams.evaluate::<GUARD>(&stage, &self.inflow, weight, &mut self.volume);
-            if GUARD {
-                self.hold_at_rims(&stage, &mut slope);
-            }
+            let stage = self.streams.each(|i| self.heads[i] + slope[i] * (share * h));
+            let (flows, _) = self.streams.flows(&stage, &self.roots);
+            slope = self.streams.drive(&flows, &self.head_inflow);
+            sum = self.streams.each(|i| sum[i] + flows[i] * weight);
         }
-        let volume = self.volume;
-        self.volume = nodes(|i| volume[i] * (h / 6.0));
-        self.end = nodes(|i| self.start[i] + self.inflow[i] * h);
-        self.streams.move_volumes(&self.volume, &mut self.end);
+        self.volume = self.streams.each(|i| sum[i] * (h / 6.0));
+        self.end = self.after(&self.volume, h);
     }
 
-    /// A tank at its rim stays there while more comes in than leaves; the rest is handed on to where it spills to,
-    /// which may be at its rim as well.
-    pub(super) fn hold_at_rims(&self, levels: &[V; N], slope: &mut [V; N]) {
-        for _ in 0..self.tanks {
-            let mut handed = false;
-            for i in 0..self.tanks {
-                if (levels[i] - self.heights[i]).largest() >= 0.0 && slope[i].largest() > 0.0 {
-                    let to = self.spills_to[i];
-                    slope[to] += slope[i] * self.areas[i] * self.streams.per_area[to];
-                    slope[i] = V::of(0.0);
-                    handed = true;
-                }
-            }
-            if !handed {
-                return;
-            }
-        }
+    /// Levels `passed_s` after the start, when the streams have moved these volumes.
+    #[inline(always)]
+    fn after(&self, volume: &[V; S], passed_s: f64) -> [V; N] {
+        let mut levels = nodes(|i| self.start[i] + self.inflow[i] * passed_s);
+        self.streams.bring(volume, &mut levels);
+        levels
     }
 
     /// Flows of the streams at the end of the step, and what they bring.
     #[inline(always)]
     pub(super) fn evaluate_end(&mut self) {
-        self.end_flow = [V::of(0.0); N];
-        self.end_net = self.streams.evaluate::<true>(&self.end, &[V::of(0.0); N], 1.0, &mut self.end_flow);
+        self.heads = self.streams.heads(&self.end);
+        let (flows, roots) = self.streams.flows(&self.heads, &self.roots);
+        self.streams.keep(&roots, &mut self.roots);
+        self.end_flow = flows;
+        self.net = self.streams.drive(&self.end_flow, &[V::of(0.0); S]);
     }
 
+    #[inline(always)]
     fn begin_span(&mut self) {
-        let zero = [V::of(0.0); N];
-        (self.span_volume, self.span_spills) = (zero, zero);
-        (self.span_pumped, self.span_arriving) = (zero, zero);
+        if self.counts {
+            let zero = [V::of(0.0); N];
+            self.span_volume = [V::of(0.0); S];
+            (self.span_spills, self.span_pumped, self.span_arriving) = (zero, zero, zero);
+        }
     }
 
-    /// Ends the span at the present.
-    pub fn end_span(&mut self) {
+    /// Works out what the present is like, where the span ends.
+    #[inline(always)]
+    fn arrive(&mut self) {
         if self.passed_s >= self.length_s {
             self.count_whole();
+            self.now = self.end;
             return;
         }
+        // A cubic through both ends of the step.
         let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
-        let volume: [V; N] =
-            nodes(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end);
+        let volume = self
+            .streams
+            .each(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end);
         self.count(volume, self.passed_s);
+        self.now = self.after(&volume, self.passed_s);
     }
 
     /// Adds what has passed of the present step, all of it, to the volumes of the span.
+    #[inline(always)]
     fn count_whole(&mut self) {
         self.count(self.volume, self.length_s);
     }
 
     /// Adds what the present step has moved so far, less what earlier spans have counted of it.
     #[inline(always)]
-    fn count(&mut self, volume: [V; N], passed_s: f64) {
+    fn count(&mut self, volume: [V; S], passed_s: f64) {
         let new_s = passed_s - self.counted_s;
-        if new_s <= 0.0 {
+        if new_s <= 0.0 || !self.counts {
             return;
         }
-        for i in 0..self.streams.len() {
-            self.span_volume[i & (N - 1)] += volume[i & (N - 1)] - self.counted[i & (N - 1)];
+        for (sum, (&volume, &counted)) in self.span_volume.iter_mut().zip(volume.iter().zip(&self.counted)) {
+            *sum += volume - counted;
         }
         for i in 0..self.feeds.len() {
             self.span_arriving[i & (N - 1)] += self.arriving[i & (N - 1)] * new_s;
@@ -377,34 +403,10 @@ impl<const N: usize, V: Number> Motion<N, V> {
     }
 
     /// The present step is over, or not begun: nothing of it has been counted.
+    #[inline(always)]
     pub(super) fn no_step(&mut self) {
         (self.length_s, self.passed_s) = (0.0, 0.0);
-        (self.counted, self.counted_s) = ([V::of(0.0); N], 0.0);
-    }
-
-    /// Level of a node now, in cm; of outside and floor, the volume in cm³.
-    #[inline(always)]
-    pub fn present(&self, node: usize) -> V {
-        if self.passed_s >= self.length_s {
-            return self.end[node];
-        }
-        self.between(Hermite::at(self.passed_s / self.length_s, self.length_s), node)
-    }
-
-    /// Levels of all nodes now.
-    #[inline(always)]
-    pub fn presents(&self) -> [V; N] {
-        if self.passed_s >= self.length_s {
-            return self.end;
-        }
-        let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
-        nodes(|i| self.between(w, i))
-    }
-
-    #[inline(always)]
-    fn between(&self, w: Hermite, i: usize) -> V {
-        let rise = self.end[i] - self.start[i];
-        self.start[i] + rise * w.rise + self.start_slope[i] * w.start + self.end_slope[i] * w.end
+        (self.counted, self.counted_s) = ([V::of(0.0); S], 0.0);
     }
 
     /// Water in the air now, in cm³: what the present step has taken out of it beyond the present is still there.
@@ -418,7 +420,7 @@ impl<const N: usize, V: Number> Motion<N, V> {
     pub fn cut(&mut self) {
         let rest_s = self.length_s - self.passed_s;
         if rest_s > 0.0 {
-            self.end = self.presents();
+            self.end = self.now;
             for (pipe, &arriving) in self.pipes.iter_mut().zip(&self.arriving) {
                 if pipe.delay_s() > 0.0 {
                     pipe.give_back(rest_s, arriving);

@@ -8,10 +8,11 @@ use super::streams::{Origin, widest};
 /// [`Motion`] of a plant, its arrays as long as the rig asks for.
 #[derive(Debug, Clone)]
 pub(crate) enum Motions {
-    Small(Box<Motion<8, f64>>),
-    Medium(Box<Motion<16, f64>>),
-    Large(Box<Motion<64, f64>>),
-    Huge(Box<Motion<512, f64>>),
+    Tiny(Box<Motion<8, 4, f64>>),
+    Small(Box<Motion<8, 8, f64>>),
+    Medium(Box<Motion<16, 16, f64>>),
+    Large(Box<Motion<64, 64, f64>>),
+    Huge(Box<Motion<512, 512, f64>>),
 }
 
 /// Most nodes, streams or pumps that a rig may have.
@@ -21,6 +22,7 @@ pub(super) const MOST_PARTS: usize = 512;
 macro_rules! each {
     ($of:expr, $motion:ident => $what:expr) => {
         match $of {
+            Motions::Tiny($motion) => $what,
             Motions::Small($motion) => $what,
             Motions::Medium($motion) => $what,
             Motions::Large($motion) => $what,
@@ -39,27 +41,72 @@ pub(super) struct Span<'a> {
     pub origins: &'a [Origin],
 }
 
+/// A span in the widest vector registers there are; the results are the same in all of them.
+struct Advance<'a, const N: usize, const S: usize> {
+    motion: &'a mut Motion<N, S, f64>,
+    duration_s: f64,
+}
+
+impl<const N: usize, const S: usize> pulp::NullaryFnOnce for Advance<'_, N, S> {
+    type Output = (f64, bool);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.motion.advance(self.duration_s)
+    }
+}
+
 impl Motions {
     pub fn new(network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
+        Self::with_room(network.valves.len(), network, coefficients, pipes)
+    }
+
+    /// With room for so many streams.
+    fn with_room(streams: usize, network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
         let areas: Vec<f64> = network.tanks.iter().map(|t| t.area_cm2).collect();
-        match widest(network) {
-            0..=8 => Self::Small(Box::new(Motion::new(network, &areas, coefficients, pipes))),
-            9..=16 => Self::Medium(Box::new(Motion::new(network, &areas, coefficients, pipes))),
-            17..=64 => Self::Large(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+        match (widest(network), streams) {
+            (0..=8, 0..=4) => Self::Tiny(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            (0..=8, 0..=8) => Self::Small(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            (0..=16, 0..=16) => Self::Medium(Box::new(Motion::new(network, &areas, coefficients, pipes))),
+            (0..=64, 0..=64) => Self::Large(Box::new(Motion::new(network, &areas, coefficients, pipes))),
             _ => Self::Huge(Box::new(Motion::new(network, &areas, coefficients, pipes))),
         }
     }
 
-    /// Lets `duration_s` pass; `levels_cm` gets the levels then.
-    #[inline]
-    pub fn advance(&mut self, network: &Network, duration_s: f64, levels_cm: &mut [f64], dry: &mut [bool]) {
+    /// Most streams there is room for.
+    fn room(&self) -> usize {
+        each!(self, m => m.volume.len())
+    }
+
+    /// The same at the present, with room for more streams.
+    fn roomier(&mut self, streams: usize, network: &Network, coefficients: &[f64]) -> Self {
+        let pipes = each!(self, m => std::mem::take(&mut m.pipes));
+        let mut made = Self::with_room(streams, network, coefficients, pipes);
+        each!(&*self, old => each!(&mut made, new => {
+            let nodes = network.tanks.len() + 2;
+            new.end[..nodes].copy_from_slice(&old.now[..nodes]);
+            let pumps = network.pumps.len();
+            new.commanded[..pumps].copy_from_slice(&old.commanded[..pumps]);
+            new.steps = old.steps;
+        }));
+        made
+    }
+
+    /// Lets `duration_s` pass in the vector registers of `arch`; `levels_cm` gets the levels then.
+    pub fn advance(
+        &mut self,
+        arch: pulp::Arch,
+        network: &Network,
+        duration_s: f64,
+        levels_cm: &mut [f64],
+        dry: &mut [bool],
+    ) {
         each!(self, m => {
-            let (left_s, fed) = m.advance(duration_s);
+            let (left_s, fed) = arch.dispatch(Advance { motion: &mut **m, duration_s });
             if left_s > 0.0 {
                 m.advance_carefully(network, left_s, fed, dry);
             }
-            m.end_span();
-            levels_cm.copy_from_slice(&m.presents()[..levels_cm.len()]);
+            levels_cm.copy_from_slice(&m.now[..levels_cm.len()]);
         });
     }
 
@@ -111,8 +158,12 @@ impl Motions {
 
     /// Takes new coefficients of valves and leaks at the present.
     pub fn collect(&mut self, network: &Network, coefficients: &[f64], leaks: &[f64]) {
+        each!(self, m => m.cut());
+        let streams = network.valves.len() + leaks.iter().filter(|&&k| k > 0.0).count();
+        if streams > self.room() {
+            *self = self.roomier(streams, network, coefficients);
+        }
         each!(self, m => {
-            m.cut();
             m.streams.collect(network, coefficients, leaks);
             m.restart();
         });
@@ -129,7 +180,7 @@ impl Motions {
 
     /// Volumes outside and on the floor, in cm³.
     pub fn lost_cm3(&self) -> (f64, f64) {
-        each!(self, m => (m.present(m.streams.outside()), m.present(m.streams.floor())))
+        each!(self, m => (m.now[m.streams.outside()], m.now[m.streams.floor()]))
     }
 
     pub fn set_lost_cm3(&mut self, outside: f64, floor: f64) {
@@ -137,6 +188,7 @@ impl Motions {
             m.cut();
             m.end[m.streams.outside()] = outside;
             m.end[m.streams.floor()] = floor;
+            m.now = m.end;
         });
     }
 

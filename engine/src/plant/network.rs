@@ -1,5 +1,6 @@
 //! The checked tank network: indices instead of names, every number in its range.
 
+use super::curve::Curve;
 use super::error::{RigError, demand};
 use super::motions::MOST_PARTS;
 use super::names::check_names;
@@ -46,33 +47,20 @@ pub struct Pump {
     pub max: f64,
     /// Largest change of the input per second; ∞ for none.
     pub rate_limit_per_s: f64,
-    curve: Vec<[f64; 2]>,
+    curve: Curve,
 }
 
 impl Pump {
     /// Flow in cm³/s for an input: linear between the curve's points, constant outside.
     #[must_use]
     pub fn flow_cm3_s(&self, input: f64) -> f64 {
-        self.flow_near(input, &mut 0)
+        self.curve.flow_cm3_s(input, &mut 0)
     }
 
     /// As [`Self::flow_cm3_s`], looking first at the piece of the curve where the last input lay.
     #[inline]
     pub(crate) fn flow_near(&self, input: f64, piece: &mut usize) -> f64 {
-        if let Some([[x0, q0], [x1, q1]]) = self.curve.get(*piece..*piece + 2)
-            && *x0 <= input
-            && input < *x1
-        {
-            return q0 + (q1 - q0) * (input - x0) / (x1 - x0);
-        }
-        let after = self.curve.partition_point(|p| p[0] <= input);
-        if after == 0 {
-            return self.curve[0][1];
-        }
-        *piece = after - 1;
-        let [x0, q0] = self.curve[after - 1];
-        let Some(&[x1, q1]) = self.curve.get(after) else { return q0 };
-        q0 + (q1 - q0) * (input - x0) / (x1 - x0)
+        self.curve.flow_cm3_s(input, piece)
     }
 }
 
@@ -190,7 +178,7 @@ impl Network {
             reservoir: spec.reservoir.as_deref().map(|r| tank_index(&spec, &spec.id, r)).transpose()?,
             spec,
         };
-        let parts = widest(&network);
+        let parts = widest(&network).max(network.valves.len() + network.tanks.len());
         let expected = format!("at most {MOST_PARTS} tanks, valves and pumps");
         demand(&network.spec.id, "size", parts as f64, parts <= MOST_PARTS, expected)?;
         for configuration in &network.spec.configurations {
@@ -307,7 +295,7 @@ fn pumps(spec: &RigSpec) -> Result<Vec<Pump>, RigError> {
                 min: p.min,
                 max: p.max,
                 rate_limit_per_s: p.rate_limit.unwrap_or(f64::INFINITY),
-                curve: p.curve.clone(),
+                curve: Curve::new(&p.curve),
             })
         })
         .collect()

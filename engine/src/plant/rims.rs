@@ -13,8 +13,8 @@ const CAREFUL_PIECES: f64 = 8.0;
 
 /// Volumes of a step in cm³ while they are mended.
 #[derive(Debug, Clone)]
-struct Volumes<const N: usize> {
-    streams: [f64; N],
+struct Volumes<const N: usize, const S: usize> {
+    streams: [f64; S],
     pumped: [f64; N],
     arriving: [f64; N],
     spilled: [f64; N],
@@ -22,7 +22,7 @@ struct Volumes<const N: usize> {
     after: [f64; N],
 }
 
-impl<const N: usize> Motion<N, f64> {
+impl<const N: usize, const S: usize> Motion<N, S, f64> {
     /// Lets `duration_s` pass in short steps that end with it, minding rims and empty tanks. `fed` pumps have had
     /// their water; `dry` tells which of the others found none.
     pub fn advance_carefully(&mut self, network: &Network, duration_s: f64, fed: bool, dry: &mut [bool]) {
@@ -32,21 +32,62 @@ impl<const N: usize> Motion<N, f64> {
             let change_s = self.pipes.iter().map(Pipe::time_to_change_s).fold(left_s, f64::min);
             left_s -= self.careful_step(network, change_s, fed, dry);
         }
+        self.now = self.end;
     }
 
     fn careful_step(&mut self, network: &Network, most_s: f64, fed: bool, dry: &mut [bool]) -> f64 {
         self.prepare_step();
+        let mut slope = self.inflow;
+        self.streams.bring(&self.start_flow, &mut slope);
         // A tank held at its rim does not hurry.
-        let (start, mut slope) = (self.start, self.start_slope);
-        self.hold_at_rims(&start, &mut slope);
-        self.start_slope = slope;
-        let step_s = self.length_for(most_s.min(CAREFUL_STEP_S), CAREFUL_PIECES);
-        self.runge_kutta::<true>(step_s);
+        self.hold_at_rims(&self.start, &mut slope);
+        let head_slope = self.streams.heads(&slope);
+        let step_s = self.length_for(&head_slope, most_s.min(CAREFUL_STEP_S), CAREFUL_PIECES);
+        self.guarded_runge_kutta(slope, step_s);
         self.mend(network, step_s, fed, dry);
         self.evaluate_end();
         self.no_step();
         self.steps += 1;
         step_s
+    }
+
+    /// One step from `start`, whose flows are there and where the levels have this slope; gives the volume of every
+    /// stream.
+    fn guarded_runge_kutta(&mut self, mut slope: [f64; N], h: f64) {
+        let mut sum = self.start_flow;
+        for (share, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+            let mut stage = self.start;
+            for (level, slope) in stage.iter_mut().zip(&slope) {
+                *level += slope * (share * h);
+            }
+            let flows = self.streams.guarded_flows(&stage);
+            slope = self.inflow;
+            self.streams.bring(&flows, &mut slope);
+            self.hold_at_rims(&stage, &mut slope);
+            for (sum, flow) in sum.iter_mut().zip(&flows) {
+                *sum += flow * weight;
+            }
+        }
+        self.volume = sum.map(|sum| sum * (h / 6.0));
+    }
+
+    /// A tank at its rim stays there while more comes in than leaves; the rest is handed on to where it spills to,
+    /// which may be at its rim as well.
+    fn hold_at_rims(&self, levels: &[f64; N], slope: &mut [f64; N]) {
+        for _ in 0..self.tanks {
+            let mut handed = false;
+            for i in 0..self.tanks {
+                if levels[i] >= self.heights[i] && slope[i] > 0.0 {
+                    let to = self.spills_to[i];
+                    slope[to] += slope[i] * self.areas[i] * self.streams.per_area[to];
+                    slope[i] = 0.0;
+                    handed = true;
+                }
+            }
+            if !handed {
+                return;
+            }
+        }
     }
 
     /// Moves the volumes of a step from start to end, mended until every tank can hold and give them.
@@ -73,7 +114,13 @@ impl<const N: usize> Motion<N, f64> {
     ///
     /// What one tank gives less, the next may not give either, round the whole circuit: with the shares x of the
     /// empty tanks' outflows, `out_i x_i − Σ_j (from j to i) x_j = held_i`, a small linear system.
-    fn empty(&mut self, network: &Network, wanted: &Volumes<N>, volumes: &mut Volumes<N>, dry: &mut [bool]) {
+    fn empty(
+        &mut self,
+        network: &Network,
+        wanted: &Volumes<N, S>,
+        volumes: &mut Volumes<N, S>,
+        dry: &mut [bool],
+    ) {
         self.emptied.clear();
         loop {
             let before = self.emptied.len();
@@ -108,7 +155,7 @@ impl<const N: usize> Motion<N, f64> {
     }
 
     /// Volumes of which only a share leaves each tank.
-    fn scale(&self, wanted: &Volumes<N>, volumes: &mut Volumes<N>, share: &[f64; N]) {
+    fn scale(&self, wanted: &Volumes<N, S>, volumes: &mut Volumes<N, S>, share: &[f64; N]) {
         for i in 0..self.streams.len() {
             volumes.streams[i] = wanted.streams[i] * share[self.left_by(i, wanted.streams[i]).0];
         }
@@ -121,7 +168,7 @@ impl<const N: usize> Motion<N, f64> {
     }
 
     /// Rows of the system for the emptied tanks; `volumes` hold what comes to them when they give nothing.
-    fn build_system(&mut self, wanted: &Volumes<N>, volumes: &Volumes<N>) {
+    fn build_system(&mut self, wanted: &Volumes<N, S>, volumes: &Volumes<N, S>) {
         let n = self.emptied.len();
         let mut system = std::mem::take(&mut self.system);
         system.clear();
@@ -179,7 +226,7 @@ impl<const N: usize> Motion<N, f64> {
     }
 
     /// Lets what no rim holds run over, from tank to tank.
-    fn spill(&self, network: &Network, volumes: &mut Volumes<N>) {
+    fn spill(&self, network: &Network, volumes: &mut Volumes<N, S>) {
         let outside = self.streams.outside();
         for _ in 0..=network.tanks.len() {
             let mut spills = false;
@@ -206,7 +253,7 @@ impl<const N: usize> Motion<N, f64> {
     }
 
     /// What every node holds after the step.
-    fn sum(&self, network: &Network, volumes: &mut Volumes<N>) {
+    fn sum(&self, network: &Network, volumes: &mut Volumes<N, S>) {
         volumes.after = self.start;
         for (i, tank) in network.tanks.iter().enumerate() {
             volumes.after[i] *= tank.area_cm2;
@@ -224,7 +271,7 @@ impl<const N: usize> Motion<N, f64> {
         }
     }
 
-    fn book(&mut self, network: &Network, volumes: &Volumes<N>, step_s: f64, fed: bool) {
+    fn book(&mut self, network: &Network, volumes: &Volumes<N, S>, step_s: f64, fed: bool) {
         self.end = volumes.after;
         for (level, tank) in self.end.iter_mut().zip(&network.tanks) {
             *level = (*level / tank.area_cm2).clamp(0.0, tank.height_cm);
@@ -239,9 +286,11 @@ impl<const N: usize> Motion<N, f64> {
             pipe.take(step_s);
             self.span_arriving[i] += volumes.arriving[i];
         }
-        for i in 0..N {
-            self.span_volume[i] += volumes.streams[i];
-            self.span_spills[i] += volumes.spilled[i];
+        for (sum, volume) in self.span_volume.iter_mut().zip(&volumes.streams) {
+            *sum += volume;
+        }
+        for (sum, spilled) in self.span_spills.iter_mut().zip(&volumes.spilled) {
+            *sum += spilled;
         }
     }
 }

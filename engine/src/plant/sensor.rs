@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::faults::Fault;
+use super::lanes::Number;
 use super::spec::{ConverterSpec, SensorSpec};
 
 /// Currents between which a transmitter signals, NAMUR NE 43: 3.8 to 20.5 mA.
@@ -71,13 +72,32 @@ struct Ills {
 /// A sensor with its converter, ready to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transmitter {
-    noise_cm: f64,
+    /// Standard deviation of the noise in cm.
+    pub(crate) noise_cm: f64,
     resolution_cm: f64,
-    range_cm: Option<[f64; 2]>,
-    code_ma: f64,
+    current: Option<Current>,
     sample_time_s: f64,
     ills: Ills,
     last: Reading,
+}
+
+/// The 4–20 mA signal of a range, and the converter that reads it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Current {
+    low_cm: f64,
+    ma_per_cm: f64,
+    cm_per_ma: f64,
+    /// One code of the converter and its inverse; 0 without one.
+    code_ma: f64,
+    codes_per_ma: f64,
+}
+
+/// What a sensor shows of a level, of one plant or several.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shown<V> {
+    pub level_cm: V,
+    /// Current that the level asks for, and the one that is read; none without a range.
+    ma: Option<(V, V)>,
 }
 
 impl Transmitter {
@@ -86,11 +106,17 @@ impl Transmitter {
     pub fn new(sensor: &SensorSpec, converters: Option<&ConverterSpec>, sample_time_s: f64) -> Self {
         let code_ma = converters
             .map_or(0.0, |c| 1000.0 * c.adc_full_scale_v / (f64::from(c.adc_bits).exp2() * c.shunt_ohm));
+        let current = |[low_cm, high_cm]: [f64; 2]| Current {
+            low_cm,
+            ma_per_cm: 16.0 / (high_cm - low_cm),
+            cm_per_ma: (high_cm - low_cm) / 16.0,
+            code_ma,
+            codes_per_ma: if code_ma > 0.0 { 1.0 / code_ma } else { 0.0 },
+        };
         Self {
             noise_cm: sensor.noise_cm,
             resolution_cm: sensor.resolution_cm,
-            range_cm: sensor.range_cm,
-            code_ma,
+            current: sensor.range_cm.map(current),
             sample_time_s,
             ills: Ills::default(),
             last: Reading { level_cm: f64::NAN, status: ReadingStatus::Good },
@@ -138,44 +164,46 @@ impl Transmitter {
         {
             level_cm += if mishaps.random::<bool>() { height_cm } else { -height_cm };
         }
-        if how.resolution && self.resolution_cm > 0.0 {
-            level_cm = nearest(level_cm / self.resolution_cm) * self.resolution_cm;
-        }
-        let reading = match self.range_cm {
-            Some([low, high]) => self.signal(level_cm, low, high - low, how.quantisation),
-            None => Reading { level_cm, status: ReadingStatus::Good },
-        };
+        let reading = self.show(level_cm, how).judged();
         self.last = reading;
         reading
     }
 
-    /// Through the 4–20 mA signal and the converter.
-    #[inline]
-    fn signal(&self, level_cm: f64, low_cm: f64, span_cm: f64, quantisation: bool) -> Reading {
-        let wanted_ma = 4.0 + 16.0 * (level_cm - low_cm) / span_cm;
-        let mut current_ma = wanted_ma.clamp(LOWEST_MA, HIGHEST_MA);
-        if quantisation && self.code_ma > 0.0 {
-            current_ma = nearest(current_ma / self.code_ma) * self.code_ma;
+    /// A level through the sensor's resolution, the signal and the converter.
+    #[inline(always)]
+    pub(crate) fn show<V: Number>(&self, mut level_cm: V, how: Measurement) -> Shown<V> {
+        if how.resolution && self.resolution_cm > 0.0 {
+            level_cm = nearest(level_cm * (1.0 / self.resolution_cm)) * self.resolution_cm;
         }
-        let status = if current_ma < BROKEN_MA {
-            ReadingStatus::Broken
-        } else if wanted_ma < LOWEST_MA {
-            ReadingStatus::BelowRange
-        } else if wanted_ma > HIGHEST_MA {
-            ReadingStatus::AboveRange
-        } else {
-            ReadingStatus::Good
+        let Some(current) = &self.current else { return Shown { level_cm, ma: None } };
+        let wanted_ma = V::of(4.0) + (level_cm - V::of(current.low_cm)) * current.ma_per_cm;
+        let mut read_ma = wanted_ma.larger(V::of(LOWEST_MA)).smaller(V::of(HIGHEST_MA));
+        if how.quantisation && current.code_ma > 0.0 {
+            read_ma = nearest(read_ma * current.codes_per_ma) * current.code_ma;
+        }
+        let level_cm = V::of(current.low_cm) + (read_ma - V::of(4.0)) * current.cm_per_ma;
+        Shown { level_cm, ma: Some((wanted_ma, read_ma)) }
+    }
+}
+
+impl Shown<f64> {
+    fn judged(self) -> Reading {
+        let status = match self.ma {
+            Some((_, read_ma)) if read_ma < BROKEN_MA => ReadingStatus::Broken,
+            Some((wanted_ma, _)) if wanted_ma < LOWEST_MA => ReadingStatus::BelowRange,
+            Some((wanted_ma, _)) if wanted_ma > HIGHEST_MA => ReadingStatus::AboveRange,
+            _ => ReadingStatus::Good,
         };
-        Reading { level_cm: low_cm + span_cm * (current_ma - 4.0) / 16.0, status }
+        Reading { level_cm: self.level_cm, status }
     }
 }
 
 /// The nearest whole number of a quotient below 2⁵¹; halves go to the even neighbour. (`f64::round` is a call into
 /// the mathematical library on the default target.)
-#[inline]
-pub(crate) fn nearest(x: f64) -> f64 {
+#[inline(always)]
+pub(crate) fn nearest<V: Number>(x: V) -> V {
     const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
-    (x + SHIFT) - SHIFT
+    (x + V::of(SHIFT)) - V::of(SHIFT)
 }
 
 #[cfg(test)]

@@ -33,6 +33,7 @@ impl Balance {
 pub struct Plant {
     network: std::sync::Arc<Network>,
     motion: Motions,
+    arch: pulp::Arch,
     levels_cm: Vec<f64>,
     inputs: Vec<f64>,
     /// Piece of each pump's curve where its input lay last.
@@ -71,6 +72,7 @@ impl Plant {
         let pipes = flows.map(|(s, flow)| Pipe::filled(s.delay_s, flow)).collect();
         let mut plant = Self {
             motion: Motions::new(&network, &coefficients, pipes),
+            arch: pulp::Arch::new(),
             levels_cm: spec.tanks.iter().map(|t| t.initial_cm).collect(),
             pieces: vec![0; pumps],
             inputs: spec.pumps.iter().map(|p| p.initial).collect(),
@@ -101,7 +103,7 @@ impl Plant {
     /// Lets `duration_s` pass with constant inputs. Flows afterwards are the means over `duration_s`.
     pub fn advance(&mut self, duration_s: f64) {
         self.dry.copy_from_slice(&self.airlocked);
-        self.motion.advance(&self.network, duration_s, &mut self.levels_cm, &mut self.dry);
+        self.motion.advance(self.arch, &self.network, duration_s, &mut self.levels_cm, &mut self.dry);
         let span = self.motion.span();
         let per_s = 1.0 / duration_s;
         for (origin, volume) in span.origins.iter().zip(span.streams) {

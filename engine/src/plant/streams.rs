@@ -1,12 +1,16 @@
 //! The open streams of a rig, flat: what the integrator evaluates a few times a sample.
 //!
 //! Nodes are numbered: the tanks in the order of the file, then the outside, then the floor (where leaks go),
-//! then a level of 0 cm that a free fall drives against. Every array over nodes, streams or pumps has the same
-//! length `N`, a power of two with room for each of them, so that the compiler knows it.
+//! then a level of 0 cm that a free fall drives against. Arrays over nodes and pumps have the length `N`, arrays over
+//! streams the length `S`, powers of two with room for all of them, so that the compiler knows them.
+//!
+//! Between the ends of a step only heads and flows are looked at: a stream's flow follows from its head, and what the
+//! flows do to every head is one small matrix.
 
 use super::lanes::Number;
 use super::motion::{STEP_CURVATURE, STEP_ERROR_CM, STEP_RATE};
 use super::network::Network;
+use super::roots::{Bends, Roots};
 use super::spec::{ValveDrive, ValveLaw};
 
 /// δ² in cm² where δ = 0, so that a head of 0 has flow 0, not 0/0.
@@ -17,10 +21,9 @@ const EXTRA: usize = 3;
 /// Up to this length a whole column is quicker than single nodes.
 const SHORT: usize = 16;
 
-/// How many nodes, streams or pumps a rig has at most, whichever are more.
+/// How many nodes or pumps a rig has, whichever are more.
 pub(crate) fn widest(network: &Network) -> usize {
-    let tanks = network.tanks.len();
-    (tanks + EXTRA).max(network.valves.len() + tanks + 1).max(network.pumps.len())
+    (network.tanks.len() + EXTRA).max(network.pumps.len())
 }
 
 /// Where a stream comes from.
@@ -33,40 +36,41 @@ pub(super) enum Origin {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Stream<V> {
+struct Stream {
     from: usize,
     /// Node whose level works against that of `from`.
     against: usize,
     to: usize,
-    k: V,
     /// Lowest head that drives it: 0 for a free fall, −∞ between two tanks.
     least: f64,
-    /// 1/A of `from` plus that of `against`, in cm⁻².
-    conductance: V,
-    /// Laminar; these come last.
-    linear: bool,
-    /// Its place in arrays over streams.
-    slot: usize,
 }
 
-impl<V: Number> Stream<V> {
+impl Stream {
+    /// Difference of a number of its nodes: of levels, or of their slopes.
     #[inline(always)]
-    fn head<const N: usize, const GUARD: bool>(&self, levels: &[V; N]) -> V {
-        // Nodes and streams are below N; the mask says so to the compiler.
-        let head = levels[self.from & (N - 1)] - levels[self.against & (N - 1)];
-        if GUARD { head.at_least(self.least) } else { head }
+    fn head<const N: usize, V: Number>(&self, nodes: &[V; N]) -> V {
+        // Nodes are below N; the mask says so to the compiler.
+        nodes[self.from & (N - 1)] - nodes[self.against & (N - 1)]
     }
 }
 
 /// Every stream that is not shut.
 #[derive(Debug, Clone)]
-pub(crate) struct Streams<const N: usize, V> {
-    /// Square roots first; an odd number is filled up with one that never flows.
-    streams: Vec<Stream<V>>,
-    laminar: bool,
+pub(crate) struct Streams<const N: usize, const S: usize, V> {
+    /// Square roots first.
+    streams: Vec<Stream>,
+    /// How many of them are square roots.
+    square_roots: usize,
+    k: [V; S],
+    /// x of a stream is `bend·h² + round`, its flow `k·h·x^(−¼)`: 1 and δ² for a square root, 0 and 1 otherwise.
+    bends: Bends<S, V>,
+    /// Fourth power of k times the sum of 1/A over the nodes of the head.
+    steepness4: [V; S],
     /// dh/dt that a flow of 1 cm³/s of each stream brings every node, in cm⁻². Multiplying by whole columns is
     /// quicker than adding to single nodes, as long as they are short.
     columns: Vec<[V; N]>,
+    /// The same for every head; none of them where they would be long.
+    couplings: Vec<[V; S]>,
     /// What each stream belongs to.
     pub(super) origins: Vec<Origin>,
     delta2: f64,
@@ -75,7 +79,7 @@ pub(crate) struct Streams<const N: usize, V> {
     tanks: usize,
 }
 
-impl<const N: usize, V: Number> Streams<N, V> {
+impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     /// The streams of a network with their coefficients: k(α) of every valve, k of every tank's leak.
     pub fn new(network: &Network, areas_cm2: &[V], coefficients: &[V], leaks: &[V]) -> Self {
         let tanks = network.tanks.len();
@@ -84,11 +88,16 @@ impl<const N: usize, V: Number> Streams<N, V> {
             *per_area = V::of(1.0) / area;
         }
         per_area[tanks..tanks + 2].fill(V::of(1.0));
+        let zero = [V::of(0.0); S];
         let mut made = Self {
-            streams: Vec::with_capacity(network.valves.len() + tanks + 1),
-            laminar: false,
-            columns: Vec::with_capacity(network.valves.len() + tanks + 1),
-            origins: Vec::with_capacity(network.valves.len() + tanks + 1),
+            streams: Vec::with_capacity(S),
+            square_roots: 0,
+            k: zero,
+            bends: Bends { bend: zero, round: [V::of(1.0); S] },
+            steepness4: zero,
+            columns: Vec::with_capacity(S),
+            couplings: vec![zero; if S <= SHORT { S } else { 0 }],
+            origins: Vec::with_capacity(S),
             delta2: (network.delta_cm * network.delta_cm).max(TINY_CM2),
             per_area,
             tanks,
@@ -99,20 +108,32 @@ impl<const N: usize, V: Number> Streams<N, V> {
 
     /// Takes new coefficients over; allocates nothing.
     pub fn collect(&mut self, network: &Network, coefficients: &[V], leaks: &[V]) {
-        self.laminar = false;
         self.streams.clear();
         self.columns.clear();
         self.origins.clear();
+        (self.k, self.steepness4) = ([V::of(0.0); S], [V::of(0.0); S]);
+        self.bends = Bends { bend: [V::of(0.0); S], round: [V::of(1.0); S] };
         self.valves(network, coefficients, ValveLaw::SquareRoot);
         for (tank, &k) in leaks.iter().enumerate() {
             if k.largest() > 0.0 {
                 self.push(tank, self.zero(), self.floor(), k, Origin::Leak(tank));
             }
         }
-        self.laminar = true;
+        self.square_roots = self.streams.len();
+        self.bends.bend[..self.square_roots].fill(V::of(1.0));
+        self.bends.round[..self.square_roots].fill(V::of(self.delta2));
         self.valves(network, coefficients, ValveLaw::Laminar);
-        if !self.streams.len().is_multiple_of(2) {
-            self.push_stream(self.zero(), self.zero(), self.zero(), V::of(0.0));
+        self.couple();
+    }
+
+    /// Works out what each flow does to every head.
+    fn couple(&mut self) {
+        let columns = self.columns.iter().map(Some).chain(std::iter::repeat(None));
+        for (coupling, column) in self.couplings.iter_mut().zip(columns) {
+            *coupling = [V::of(0.0); S];
+            for (stream, share) in self.streams.iter().zip(coupling) {
+                *share = column.map_or(V::of(0.0), |column| stream.head(column));
+            }
         }
     }
 
@@ -129,19 +150,17 @@ impl<const N: usize, V: Number> Streams<N, V> {
     }
 
     fn push(&mut self, from: usize, against: usize, to: usize, k: V, origin: Origin) {
-        self.origins.push(origin);
-        self.push_stream(from, against, to, k);
-    }
-
-    fn push_stream(&mut self, from: usize, against: usize, to: usize, k: V) {
-        let conductance = self.per_area[from] + self.per_area[against];
-        let least = if against == self.zero() { 0.0 } else { f64::NEG_INFINITY };
+        let slot = self.streams.len();
+        let steepness = k * (self.per_area[from] + self.per_area[against]);
+        let steepness2 = steepness * steepness;
+        (self.k[slot], self.steepness4[slot]) = (k, steepness2 * steepness2);
         let mut column = [V::of(0.0); N];
         column[from] -= self.per_area[from];
         column[to] += self.per_area[to];
         self.columns.push(column);
-        let (linear, slot) = (self.laminar, self.streams.len());
-        self.streams.push(Stream { from, against, to, k, least, conductance, linear, slot });
+        self.origins.push(origin);
+        let least = if against == self.zero() { 0.0 } else { f64::NEG_INFINITY };
+        self.streams.push(Stream { from, against, to, least });
     }
 
     /// Number of open streams.
@@ -174,64 +193,87 @@ impl<const N: usize, V: Number> Streams<N, V> {
         self.streams.iter().any(|s| s.from == tank || s.against == tank)
     }
 
-    /// Adds `weight` times the flow of every stream in cm³/s to `sum`; gives `base`, a dh/dt in cm/s, with what they
-    /// bring every node.
-    ///
-    /// With `GUARD` nothing falls out of a tank that a stage of a step has taken below its floor.
+    /// How much of an array over streams to work through: all of it where that is little, since the compiler knows its
+    /// length.
     #[inline(always)]
-    pub fn evaluate<const GUARD: bool>(
-        &self,
-        levels: &[V; N],
-        base: &[V; N],
-        weight: f64,
-        sum: &mut [V; N],
-    ) -> [V; N] {
-        let mut slope = *base;
-        // Two at a time: half as many vector roots. Padding closes an odd number.
-        for (pair, columns) in self.streams.as_chunks::<2>().0.iter().zip(self.columns.as_chunks::<2>().0) {
-            let [one, two] = pair;
-            let (h1, h2) = (one.head::<N, GUARD>(levels), two.head::<N, GUARD>(levels));
-            let delta2 = V::of(self.delta2);
-            let (r1, r2) = ((h1 * h1 + delta2).sqrt().sqrt(), (h2 * h2 + delta2).sqrt().sqrt());
-            let (q1, q2) = (one.k * h1, two.k * h2);
-            let (mut f1, mut f2) = (q1 / r1, q2 / r2);
-            if two.linear {
-                f2 = q2;
-                f1 = if one.linear { q1 } else { f1 };
-            } else if one.linear {
-                f1 = q1;
-            }
-            sum[one.slot & (N - 1)] += f1 * weight;
-            sum[two.slot & (N - 1)] += f2 * weight;
-            self.add(one, &columns[0], f1, &mut slope);
-            if two.slot < self.origins.len() {
-                self.add(two, &columns[1], f2, &mut slope);
-            }
-        }
-        slope
+    pub fn slots(&self) -> usize {
+        if S * V::PLANTS <= SHORT { S } else { self.streams.len().min(S) }
     }
 
-    /// Adds what a stream's flow, or volume, brings every node.
+    /// An array over streams.
     #[inline(always)]
-    fn add(&self, stream: &Stream<V>, column: &[V; N], flow: V, nodes: &mut [V; N]) {
-        if N <= SHORT && V::PLANTS == 1 {
-            for (node, &share) in nodes.iter_mut().zip(column) {
-                *node += share * flow;
-            }
-        } else {
-            let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
-            nodes[from] += column[from] * flow;
-            if to != from {
-                nodes[to] += column[to] * flow;
-            }
+    pub fn each(&self, stream: impl Fn(usize) -> V) -> [V; S] {
+        let mut made = [V::of(0.0); S];
+        for (i, made) in made.iter_mut().enumerate().take(self.slots()) {
+            *made = stream(i);
         }
+        made
     }
 
-    /// Adds what the streams' volumes bring every node, in cm.
+    /// Difference of a number of each stream's nodes: of levels its head, of slopes the head's slope.
     #[inline(always)]
-    pub fn move_volumes(&self, volumes: &[V; N], levels: &mut [V; N]) {
-        for (stream, column) in self.streams.iter().zip(&self.columns) {
-            self.add(stream, column, volumes[stream.slot & (N - 1)], levels);
+    pub fn heads(&self, nodes: &[V; N]) -> [V; S] {
+        let mut heads = [V::of(0.0); S];
+        for (head, stream) in heads.iter_mut().zip(&self.streams) {
+            *head = stream.head(nodes);
+        }
+        heads
+    }
+
+    /// Flow of every stream in cm³/s, and x^(−¼), from those of heads near by.
+    #[inline(always)]
+    pub fn flows(&self, heads: &[V; S], near: &Roots<S, V>) -> ([V; S], [V; S]) {
+        let roots = near.at(heads, &self.bends, self.slots());
+        (self.each(|i| self.k[i] * heads[i] * roots[i]), roots)
+    }
+
+    /// Slope of every head that flows bring, added to `base`, in cm/s.
+    #[inline(always)]
+    pub fn drive(&self, flows: &[V; S], base: &[V; S]) -> [V; S] {
+        let Ok(couplings) = <&[[V; S]; S]>::try_from(self.couplings.as_slice()) else {
+            let mut net = [V::of(0.0); N];
+            self.bring(flows, &mut net);
+            return self.each(|i| base[i] + self.streams[i].head(&net));
+        };
+        // Two sums side by side, since an addition waits for the one before.
+        let (mut even, mut odd) = (*base, [V::of(0.0); S]);
+        for j in 0..self.slots() {
+            let sum = if j % 2 == 0 { &mut even } else { &mut odd };
+            for i in 0..self.slots() {
+                sum[i] += couplings[j][i] * flows[j];
+            }
+        }
+        self.each(|i| even[i] + odd[i])
+    }
+
+    /// Keeps x^(−¼), for flows near by.
+    #[inline(always)]
+    pub fn keep(&self, roots: &[V; S], kept: &mut Roots<S, V>) {
+        kept.keep(roots, &self.bends, self.slots());
+    }
+
+    /// Flow of every stream in cm³/s where nothing falls out of a tank that a stage of a step has taken below its floor.
+    pub fn guarded_flows(&self, levels: &[V; N]) -> [V; S] {
+        let mut heads = self.heads(levels);
+        for (head, stream) in heads.iter_mut().zip(&self.streams) {
+            *head = head.at_least(stream.least);
+        }
+        self.flows(&heads, &Roots::none()).0
+    }
+
+    /// Adds what the streams' volumes, or flows, bring every node, in cm or cm/s.
+    #[inline(always)]
+    pub fn bring(&self, volumes: &[V; S], nodes: &mut [V; N]) {
+        for ((stream, column), &volume) in self.streams.iter().zip(&self.columns).zip(volumes) {
+            if N <= SHORT && V::PLANTS == 1 {
+                for i in 0..N {
+                    nodes[i] += column[i] * volume;
+                }
+            } else {
+                let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
+                nodes[from] += column[from] * volume;
+                nodes[to] += column[to] * volume;
+            }
         }
     }
 
@@ -240,38 +282,41 @@ impl<const N: usize, V: Number> Streams<N, V> {
     /// No head changes by more than [`STEP_CURVATURE`] of √(δ² + head²), no rate times the step is above [`STEP_RATE`],
     /// and where both are within their bounds, their product stays below [`STEP_ERROR_CM`].
     #[inline(always)]
-    pub fn pieces(&self, levels: &[V; N], slope: &[V; N], step_s: f64) -> f64 {
-        let mut worst = 1.0_f64;
-        let bend2 = V::of(STEP_CURVATURE * STEP_CURVATURE);
-        let (rate4, error2) = (V::of(STEP_RATE.powi(4)), V::of(STEP_ERROR_CM * STEP_ERROR_CM));
-        for stream in &self.streams {
-            let (from, against) = (stream.from & (N - 1), stream.against & (N - 1));
-            let head = levels[from] - levels[against];
-            let change = (slope[from] - slope[against]) * step_s;
-            let r2 = head * head + V::of(self.delta2);
-            let change2 = change * change;
-            let steepest = stream.k * stream.conductance * step_s;
-            let steepest2 = steepest * steepest;
-            let steepest4 = steepest2 * steepest2;
-            if (change2 - bend2 * r2).largest() > 0.0 {
-                worst = worst.max((change2 / r2).largest().sqrt() / STEP_CURVATURE);
-            }
+    pub fn pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
+        let step2 = step_s * step_s;
+        let step4 = step2 * step2;
+        let mut worst = V::of(0.0);
+        for i in 0..self.slots() {
+            let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
+            let (change2, rate4) = (change * change, self.steepness4[i] * step4);
             // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
-            let (rated4, scale) = if stream.linear { (steepest4, V::of(1.0)) } else { (steepest4, r2) };
-            if (rated4 * rated4 * change2 - error2 * scale * scale).largest() > 0.0 {
-                let error_cm = ((rated4 * rated4 * change2) / (scale * scale)).largest().sqrt();
-                worst = worst.max((error_cm / STEP_ERROR_CM).powf(0.2));
-            }
-            if stream.linear {
-                worst = worst.max(steepest.largest() / STEP_RATE);
-                continue;
-            }
+            let scale = r2 * self.bends.bend[i] + (V::of(1.0) - self.bends.bend[i]);
+            let error2 = scale * scale * (STEP_ERROR_CM * STEP_ERROR_CM);
+            worst = worst.larger(change2 - r2 * (STEP_CURVATURE * STEP_CURVATURE));
+            worst = worst.larger(rate4 - scale * STEP_RATE.powi(4));
+            worst = worst.larger(rate4 * rate4 * change2 - error2);
+        }
+        if worst.is_at_most(V::of(0.0)) { 1.0 } else { self.count_pieces(heads, slope, step_s) }
+    }
+
+    #[inline(never)]
+    fn count_pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
+        let (mut bend2, mut rate4, mut error2) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let step4 = step_s * step_s * step_s * step_s;
+        for i in 0..self.streams.len().min(S) {
+            let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
+            let (change2, linear) = (change * change, i >= self.square_roots);
+            bend2 = bend2.max((change2 / r2).largest());
+            let steep4 = self.steepness4[i] * step4;
+            let rated4 = if linear { steep4 } else { steep4 / r2 };
+            error2 = error2.max((rated4 * rated4 * change2).largest());
             // An empty tank with δ = 0 that stays empty needs no steps for its slope.
-            let steep = (steepest4 - rate4 * r2).largest() > 0.0;
-            if steep && (self.delta2 > TINY_CM2 || change2.largest() > 0.0) {
-                worst = worst.max((steepest2 / r2.sqrt()).largest().sqrt() / STEP_RATE);
+            if linear || self.delta2 > TINY_CM2 || change2.largest() > 0.0 {
+                rate4 = rate4.max(rated4.largest());
             }
         }
-        worst
+        let worst = (bend2.sqrt() / STEP_CURVATURE).max(rate4.sqrt().sqrt() / STEP_RATE).max(1.0);
+        let error_cm = error2.sqrt();
+        if error_cm > STEP_ERROR_CM { worst.max((error_cm / STEP_ERROR_CM).powf(0.2)) } else { worst }
     }
 }

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::closed_loop::ClosedLoop;
 use super::flock::{PLANTS, can_flock, run_flock};
 use super::scenario::{Prepared, Scenario, ScenarioError, prepare, run_samples};
+use super::watch::{Seen, Watch};
 use crate::plant::{Measurement, Network, RigError};
 use crate::signal::ChannelKind;
 
@@ -32,8 +33,6 @@ pub struct Spread {
 const LARGEST_SPREAD: f64 = 0.3;
 /// Most plants of an ensemble.
 pub const MOST_MEMBERS: usize = 1_000_000;
-/// Rows of the bands, at most.
-const BAND_ROWS: usize = 500;
 
 /// Figures of one loop of one plant over the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,49 +60,6 @@ pub struct EnsembleRun {
     pub bands_cm: Vec<[f64; 3]>,
     /// How many plants ran in lanes; the others ran one by one.
     pub in_lanes: usize,
-}
-
-/// What one plant is seen to do, sample by sample.
-#[derive(Debug, Clone)]
-pub(super) struct Watch {
-    stride: u64,
-    sample_time_s: f64,
-    last_mv: Option<f64>,
-    figures: MemberFigures,
-    pub levels_cm: Vec<f64>,
-}
-
-impl Watch {
-    pub fn new(samples: u64, sample_time_s: f64) -> Self {
-        Self {
-            stride: samples.div_ceil(BAND_ROWS as u64).max(1),
-            sample_time_s,
-            last_mv: None,
-            figures: MemberFigures {
-                iae_cm_s: 0.0,
-                tv: 0.0,
-                level_cm: [f64::INFINITY, f64::NEG_INFINITY],
-                end_cm: f64::NAN,
-            },
-            levels_cm: vec![],
-        }
-    }
-
-    #[inline]
-    pub fn see(&mut self, sample: u64, setpoint_cm: f64, pv_cm: f64, mv: f64, level_cm: f64) {
-        let f = &mut self.figures;
-        let error = (setpoint_cm - pv_cm).abs();
-        if error.is_finite() {
-            f.iae_cm_s += error * self.sample_time_s;
-        }
-        f.tv += self.last_mv.map_or(0.0, |last| (mv - last).abs());
-        self.last_mv = Some(mv);
-        f.level_cm = [f.level_cm[0].min(level_cm), f.level_cm[1].max(level_cm)];
-        f.end_cm = level_cm;
-        if sample.is_multiple_of(self.stride) {
-            self.levels_cm.push(level_cm);
-        }
-    }
 }
 
 /// A rig that differs from its file by `spread`.
@@ -174,7 +130,7 @@ pub fn run_ensemble(
             watches.push(alone(network, *seed, &prepared, scenario.measurement)?);
         }
     }
-    let stride = watches.first().map_or(1, |w: &Watch| w.stride);
+    let stride = watches.first().map_or(1, |w: &Seen| w.stride);
     let rows = watches.first().map_or(0, |w| w.levels_cm.len());
     let h = network.spec.sample_time_s;
     Ok(EnsembleRun {
@@ -221,7 +177,7 @@ fn alone(
     seed: u64,
     prepared: &Prepared,
     measurement: Measurement,
-) -> Result<Watch, ScenarioError> {
+) -> Result<Seen, ScenarioError> {
     let start = &prepared.closed;
     let mut closed = ClosedLoop::resembling(start, network.clone(), measurement, seed)
         .map_err(|error| ScenarioError::Command { at_s: 0.0, error })?;
@@ -235,7 +191,7 @@ fn alone(
     run_samples(&mut closed, &prepared.events, prepared.samples, |sample, _, row| {
         watch.see(sample, row[sp], row[pv], row[mv], row[level]);
     })?;
-    Ok(watch)
+    Ok(watch.of_plant(0))
 }
 
 /// 5, 50 and 95 % quantiles.

@@ -7,10 +7,12 @@ mod ensemble;
 mod excite;
 mod figures;
 mod flock;
+mod flock_loop;
 mod real_rig;
 mod scenario;
 mod scenario_event;
 mod start;
+mod watch;
 
 pub use active_loop::{ActiveLoop, LoopTarget};
 pub use closed_loop::ClosedLoop;
