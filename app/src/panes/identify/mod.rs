@@ -2,6 +2,7 @@
 
 mod data;
 mod evidence;
+mod excite;
 mod models;
 
 use eframe::egui::{self, RichText};
@@ -9,7 +10,8 @@ use vasos_engine::document::{DocumentCommand, ModelOrigin, NewModel, SourceChoic
 use vasos_engine::identify::Structure;
 use vasos_engine::model::{Fopdt, ProcessModel};
 
-pub use data::{FitData, data, structure_name};
+pub use data::{FitData, data, of_report, structure_name};
+pub use excite::Bench;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -21,6 +23,8 @@ pub struct State {
     mv_before: Option<f64>,
     structure: Option<Structure>,
     picture: evidence::Picture,
+    /// Tests of the running loop.
+    pub bench: Bench,
     typed: [f64; 3],
     typing: bool,
 }
@@ -31,6 +35,7 @@ impl Default for State {
             mv_before: None,
             structure: None,
             picture: evidence::Picture::default(),
+            bench: Bench::default(),
             typed: [4.9, 152.0, 2.0],
             typing: false,
         }
@@ -42,6 +47,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let mut actions = vec![];
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         source(ui, view, state, &mut actions);
+        excite::ui(ui, view, &mut state.bench, &mut actions);
         models::table(ui, view, &mut actions);
         if state.typing {
             type_model(ui, view, state, &mut actions);
