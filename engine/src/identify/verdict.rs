@@ -144,37 +144,11 @@ impl std::fmt::Display for FitVerdict {
                 "the fit is poor ({} %): the MV explains little of this PV's movement, or the structure is the wrong one",
                 n(*fit_percent)
             ),
-            Self::GainUncertain { percent, mv_move, mv_moved } => write!(
-                f,
-                "the move was too small for this noise: the gain is known only to ±{} %; a move of the MV by {} instead of {} would give ±10 %",
-                n(*percent),
-                n(*mv_move),
-                n(*mv_moved)
-            ),
-            Self::ParameterUncertain { name, percent, mv_move } => write!(
-                f,
-                "{name} is known only to ±{} %: a move of the MV by {} would give ±20 %",
-                n(*percent),
-                n(*mv_move)
-            ),
-            Self::DeadTimeUnknown { upper_s, mv_move } => write!(
-                f,
-                "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
-                n(*upper_s),
-                n(*mv_move)
-            ),
-            Self::TimeConstantLong { time_constant_s, span_s } => write!(
-                f,
-                "T = {} s is longer than the stretch ({} s): only the ratio K/T is known, record longer",
-                n(*time_constant_s),
-                n(*span_s)
-            ),
-            Self::TimeConstantShort { time_constant_s, sample_time_s } => write!(
-                f,
-                "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
-                n(*time_constant_s),
-                n(*sample_time_s)
-            ),
+            Self::GainUncertain { .. }
+            | Self::ParameterUncertain { .. }
+            | Self::DeadTimeUnknown { .. }
+            | Self::TimeConstantLong { .. }
+            | Self::TimeConstantShort { .. } => self.write_parameter(f),
             Self::ResolutionLimited { resolution, levels } => write!(
                 f,
                 "resolution, not noise, limits the gain: the PV moves in steps of {} and the whole movement is {} of them; the intervals are too optimistic",
@@ -277,6 +251,45 @@ impl Explain for FitVerdict {
 }
 
 impl FitVerdict {
+    /// What is said of a single parameter; nothing for the others.
+    fn write_parameter(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::GainUncertain { percent, mv_move, mv_moved } => write!(
+                f,
+                "the move was too small for this noise: the gain is known only to ±{} %; a move of the MV by {} instead of {} would give ±10 %",
+                n(*percent),
+                n(*mv_move),
+                n(*mv_moved)
+            ),
+            Self::ParameterUncertain { name, percent, mv_move } => write!(
+                f,
+                "{name} is known only to ±{} %: a move of the MV by {} would give ±20 %",
+                n(*percent),
+                n(*mv_move)
+            ),
+            Self::DeadTimeUnknown { upper_s, mv_move } => write!(
+                f,
+                "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
+                n(*upper_s),
+                n(*mv_move)
+            ),
+            Self::TimeConstantLong { time_constant_s, span_s } => write!(
+                f,
+                "T = {} s is longer than the stretch ({} s): only the ratio K/T is known, record longer",
+                n(*time_constant_s),
+                n(*span_s)
+            ),
+            Self::TimeConstantShort { time_constant_s, sample_time_s } => write!(
+                f,
+                "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
+                n(*time_constant_s),
+                n(*sample_time_s)
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether it speaks against using the model.
     #[must_use]
     pub fn is_objection(&self) -> bool {
