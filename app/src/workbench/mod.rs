@@ -12,8 +12,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use eframe::egui;
-use vasos_engine::document::{Document, History, SourceChoice};
-use vasos_engine::excitation::ExcitationReport;
+use vasos_engine::document::{Document, DocumentCommand, History, SourceChoice};
+use vasos_engine::excitation::{Ending, ExcitationReport, Signal, StepEnd};
 use vasos_engine::session::{EventKind, Session, SessionCommand};
 use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
@@ -184,7 +184,7 @@ impl Workbench {
         for event in events {
             self.run.note(&event);
             if let EventKind::ExcitationEnded(report) = &event.kind {
-                self.take_report(report.clone());
+                self.take_report(ctx, report.clone());
             }
             journal::add(&mut self.journal, journal::of_event(&event));
         }
@@ -200,7 +200,15 @@ impl Workbench {
     }
 
     /// Keeps what a test of the loop measured, and fits its record where the loop was moved.
-    fn take_report(&mut self, report: Arc<ExcitationReport>) {
+    fn take_report(&mut self, ctx: &egui::Context, report: Arc<ExcitationReport>) {
+        // A setpoint that a test leaves behind is a setting like one that was typed.
+        if let (Ending::Finished, Signal::SetpointStep { end: StepEnd::Stay, .. }) =
+            (&report.ending, &report.excitation.signal)
+            && let Some(&level_cm) = report.record.setpoint.last()
+        {
+            let change = DocumentCommand::Setpoint(report.tag.clone(), level_cm);
+            self.act(ctx, Action::Document(change));
+        }
         self.states.identify.bench.report = Some(report.clone());
         if report.moved_at_s.is_none() {
             return;
