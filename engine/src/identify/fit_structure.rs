@@ -5,7 +5,7 @@ use super::judge;
 use super::model_fit::{DisturbanceFit, ModelFit};
 use super::output_error::{
     Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, dead_time_interval, evaluate,
-    search,
+    is_wide, search,
 };
 use super::parameters::Coordinates;
 use super::problem::{Drift, FitProblem, Stretch};
@@ -92,33 +92,34 @@ pub(super) fn fit_on(
     };
     let found = found.ok_or_else(nothing)?;
     let mut fit = report(problem, stretch, structure, &shape, &found).ok_or_else(nothing)?;
-    match by_short_cut {
-        Some(interval) if fit.tests.rows_per_independent <= 1.0 => {
-            if let Some(l) = fit.parameters.iter_mut().find(|p| p.name == "L_s") {
-                l.interval_95 = interval;
-            }
-        }
-        _ => profile_dead_times(stretch, &shape, &found, &mut fit, &mut work),
-    }
+    profile_dead_times(stretch, &shape, &found, by_short_cut, &mut fit, &mut work);
     (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
     fit.verdicts = judge::of_model(&fit, stretch, problem);
     Ok(fit)
 }
 
-/// Intervals of the dead times by likelihood ratio, where the curvature would not do.
-fn profile_dead_times(stretch: &Stretch, shape: &Shape, found: &Found, fit: &mut ModelFit, work: &mut Work) {
+/// Intervals of the dead times by likelihood ratio, where the curvature would not do; `by_short_cut` is that of the
+/// short cut, which holds where the residuals are white and the interval is narrow.
+fn profile_dead_times(
+    stretch: &Stretch,
+    shape: &Shape,
+    found: &Found,
+    by_short_cut: Option<Interval>,
+    fit: &mut ModelFit,
+    work: &mut Work,
+) {
     let freedom = fit.rows.saturating_sub(fit.unknowns).max(1) as f64;
     let variance = fit.mse * fit.rows as f64 / freedom * fit.tests.rows_per_independent;
+    let white = fit.tests.rows_per_independent <= 1.0;
     let student = fit.student;
     let main = std::iter::once(&mut fit.parameters);
     let all = main.chain(fit.disturbances.iter_mut().map(|d| &mut d.parameters));
     for (channel, parameters) in all.enumerate() {
-        if let Some(l) = parameters.iter_mut().find(|p| p.name == "L_s") {
-            let around = Around { channel, standard_error_s: l.standard_error, student, variance };
-            if let Some(interval) = dead_time_interval(stretch, shape, found, around, &mut work.passes) {
-                l.interval_95 = interval;
-            }
-        }
+        let Some(l) = parameters.iter_mut().find(|p| p.name == "L_s") else { continue };
+        let around = Around { channel, standard_error_s: l.standard_error, student, variance };
+        let known = by_short_cut.filter(|_| white && !is_wide(stretch, shape, found, around));
+        let interval = known.or_else(|| dead_time_interval(stretch, shape, found, around, &mut work.passes));
+        l.interval_95 = interval.unwrap_or(l.interval_95);
     }
 }
 
