@@ -128,6 +128,7 @@ fn what_is_simulated_is_identified() {
         "criterion",
         "models",
         "oscillation",
+        "reaction_curve",
         "repairs",
         "runner_up",
         "warnings",

@@ -1,6 +1,7 @@
 //! Every structure against records computed in closed form, term by term.
 
-use num_complex::Complex64;
+mod records;
+
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -8,76 +9,7 @@ use vasos_engine::identify::{
     Disturbance, Drift, FitOptions, FitProblem, ModelFit, Structure, choose_model, fit_model,
 };
 
-/// Truth of a test: K (Tz s + 1)/(τ² s² + 2ζτ s + 1), or with an integrator K/s, dead time L.
-#[derive(Debug, Clone, Copy)]
-enum Truth {
-    First { k: f64, t: f64, l: f64 },
-    Integrator { kv: f64, l: f64 },
-    Second { k: f64, tau: f64, zeta: f64, tz: f64, l: f64 },
-}
-
-impl Truth {
-    /// Response to a unit step, dead time left out: residues at the poles.
-    fn step(&self, t: f64) -> f64 {
-        match *self {
-            _ if t <= 0.0 => 0.0,
-            Self::First { k, t: tc, .. } => -k * (-t / tc).exp_m1(),
-            Self::Integrator { kv, .. } => kv * t,
-            Self::Second { k, tau, zeta: 1.0, tz, .. } => {
-                let e = (-t / tau).exp();
-                k * (1.0 - (1.0 + t / tau) * e + tz * t / (tau * tau) * e)
-            }
-            Self::Second { k, tau, zeta, tz, .. } => {
-                let root = Complex64::new(zeta * zeta - 1.0, 0.0).sqrt();
-                let poles = [(-zeta + root) / tau, (-zeta - root) / tau];
-                let residue = |p: Complex64, q: Complex64| (1.0 + tz * p) / (tau * tau * (p - q) * p);
-                let sum = residue(poles[0], poles[1]) * (poles[0] * t).exp()
-                    + residue(poles[1], poles[0]) * (poles[1] * t).exp();
-                k * (1.0 + sum.re)
-            }
-        }
-    }
-
-    fn dead_time(&self) -> f64 {
-        match *self {
-            Self::First { l, .. } | Self::Integrator { l, .. } | Self::Second { l, .. } => l,
-        }
-    }
-
-    /// Response to a held input that was `before` ahead of the first row.
-    fn run(&self, time_s: &[f64], u: &[f64], before: f64) -> Vec<f64> {
-        let mut last = before;
-        let mut moves = vec![];
-        for (&t, &u) in time_s.iter().zip(u) {
-            if u != last {
-                moves.push((t + self.dead_time(), u - last));
-                last = u;
-            }
-        }
-        time_s.iter().map(|&t| moves.iter().map(|(at, du)| du * self.step(t - at)).sum()).collect()
-    }
-
-    /// What a fit of it must give: name and value, with the size that its tolerance refers to.
-    fn expected(&self) -> Vec<(&'static str, f64, f64)> {
-        match *self {
-            Self::First { k, t, l } => vec![("K", k, k), ("T_s", t, t), ("L_s", l, t)],
-            Self::Integrator { kv, l } => vec![("Kv", kv, kv), ("L_s", l, l.max(1.0))],
-            Self::Second { k, tau, zeta, tz, l } => {
-                let mut out = vec![("K", k, k), ("L_s", l, tau)];
-                if tz != 0.0 {
-                    out.push(("Tz_s", tz, tz));
-                }
-                if zeta < 1.0 {
-                    out.extend([("T_s", tau, tau), ("zeta", zeta, zeta)]);
-                } else {
-                    let slow = zeta + (zeta * zeta - 1.0).sqrt();
-                    out.extend([("T_s", tau * slow, tau * slow), ("T2_s", tau / slow, tau / slow)]);
-                }
-                out
-            }
-        }
-    }
-}
+use records::{Truth, moves};
 
 fn assert_found(truth: &Truth, fit: &ModelFit, tolerance: f64, what: &str) {
     for (name, value, size) in truth.expected() {
@@ -94,10 +26,6 @@ fn assert_found(truth: &Truth, fit: &ModelFit, tolerance: f64, what: &str) {
 
 fn to_12_digits(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| format!("{v:.11e}").parse().expect("a number")).collect()
-}
-
-fn moves(time_s: &[f64], at: &[(f64, f64)], start: f64) -> Vec<f64> {
-    time_s.iter().map(|&t| at.iter().rev().find(|(from, _)| t >= *from).map_or(start, |m| m.1)).collect()
 }
 
 /// The specification of identification, "Structures and estimators", held to what it asks of FOPDT: 1e-6. Second orders

@@ -1,13 +1,10 @@
-//! What the engine costs: simulation at the sample time, identification, analysis.
+//! What the engine costs: simulation at the sample time, analysis.
 
 use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use vasos_engine::analyze::{analyze, step_figures};
 use vasos_engine::control::{PidGains, PidTuning};
-use vasos_engine::identify::{FitProblem, fit_fopdt, simulate_fopdt};
 use vasos_engine::model::{Fopdt, ProcessModel};
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::RigCommand;
@@ -113,23 +110,6 @@ fn many_plants(c: &mut Criterion) {
     group.finish();
 }
 
-/// Ten thousand rows of a step test with noise of 0.05 cm, always the same.
-fn identify(c: &mut Criterion) {
-    const ROWS: u32 = 10_000;
-    let time_s: Vec<f64> = (0..ROWS).map(|k| 0.2 * f64::from(k)).collect();
-    let mv: Vec<f64> = time_s.iter().map(|t| if (100.0..1100.0).contains(t) { 4.0 } else { 3.0 }).collect();
-    let clean = simulate_fopdt(&model(), &time_s, &mv, 3.0, 0.0, None).expect("a run");
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
-    let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-    let pv: Vec<f64> = clean.iter().map(|y| y + 0.05 * normal()).collect();
-    let mut group = c.benchmark_group("identify");
-    group.throughput(Throughput::Elements(u64::from(ROWS)));
-    group.bench_function("fopdt_of_10000_rows", |b| {
-        b.iter(|| fit_fopdt(&FitProblem::new(black_box(&time_s), &pv, &mv)).expect("a fit"));
-    });
-    group.finish();
-}
-
 fn analysis(c: &mut Criterion) {
     let model = ProcessModel::Fopdt(model());
     let tunings = [("pi", PidGains::pi(1.94, 32.0)), ("pid", PidGains::pid(2.5, 24.0, 4.0))];
@@ -147,5 +127,5 @@ fn analysis(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, closed_loop, many_plants, identify, analysis);
+criterion_group!(benches, closed_loop, many_plants, analysis);
 criterion_main!(benches);

@@ -11,7 +11,7 @@ use vasos_engine::document::DocumentError;
 use vasos_engine::excitation::{ExcitationError, ExcitationWarning, StopReason};
 use vasos_engine::experiment::{ExperimentError, RunError};
 use vasos_engine::explain::Explain;
-use vasos_engine::identify::{FitError, FitVerdict, RecordFinding};
+use vasos_engine::identify::{FitError, FitVerdict, ReactionCurveError, RecordFinding};
 use vasos_engine::model::{ModelError, ReduceError, StateSpaceError};
 use vasos_engine::plant::{LinearError, RigError};
 use vasos_engine::session::{Alarm, CommandError};
@@ -224,6 +224,7 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("DocumentError", boxed(DocumentError::samples())),
         ("ScenarioError", boxed(scenario)),
         ("FitError", boxed(FitError::samples())),
+        ("ReactionCurveError", boxed(ReactionCurveError::samples())),
         ("FitVerdict", boxed(FitVerdict::samples())),
         ("RecordFinding", boxed(RecordFinding::samples())),
         ("ExpressionError", boxed(ExpressionError::samples())),

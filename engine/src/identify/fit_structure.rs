@@ -4,7 +4,8 @@ use super::fopdt::Interval;
 use super::judge;
 use super::model_fit::{DisturbanceFit, ModelFit};
 use super::output_error::{
-    Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, evaluate, search,
+    Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, dead_time_interval, evaluate,
+    is_wide, search,
 };
 use super::parameters::Coordinates;
 use super::problem::{Drift, FitProblem, Stretch};
@@ -75,11 +76,11 @@ pub(super) fn fit_on(
     let mut work = Work::default();
     let plain =
         structure == Structure::Fopdt && !drift && stretch.keep.is_none() && problem.disturbances.is_empty();
-    let mut dead_time_interval = None;
+    let mut by_short_cut = None;
     let found = if plain {
         let fit = fit_fopdt(problem)?;
         work = Work { passes: fit.passes + 1, thinned: fit.thinned_passes };
-        dead_time_interval = Some(fit.interval_95.dead_time_s);
+        by_short_cut = Some(fit.interval_95.dead_time_s);
         let point =
             Point { time_s: fit.model.time_constant_s, zeta: 1.0, dead_time_s: fit.model.dead_time_s };
         // Residuals against the short cut's answer keep the digits that the inner products would square away.
@@ -91,15 +92,35 @@ pub(super) fn fit_on(
     };
     let found = found.ok_or_else(nothing)?;
     let mut fit = report(problem, stretch, structure, &shape, &found).ok_or_else(nothing)?;
-    if let Some(interval) = dead_time_interval
-        && fit.tests.rows_per_independent <= 1.0
-        && let Some(l) = fit.parameters.iter_mut().find(|p| p.name == "L_s")
-    {
-        l.interval_95 = interval;
-    }
+    profile_dead_times(stretch, &shape, &found, by_short_cut, &mut fit, &mut work);
     (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
     fit.verdicts = judge::of_model(&fit, stretch, problem);
     Ok(fit)
+}
+
+/// Intervals of the dead times by likelihood ratio, where the curvature would not do; `by_short_cut` is that of the
+/// short cut, which holds where the residuals are white and the interval is narrow.
+fn profile_dead_times(
+    stretch: &Stretch,
+    shape: &Shape,
+    found: &Found,
+    by_short_cut: Option<Interval>,
+    fit: &mut ModelFit,
+    work: &mut Work,
+) {
+    let freedom = fit.rows.saturating_sub(fit.unknowns).max(1) as f64;
+    let variance = fit.mse * fit.rows as f64 / freedom * fit.tests.rows_per_independent;
+    let white = fit.tests.rows_per_independent <= 1.0;
+    let student = fit.student;
+    let main = std::iter::once(&mut fit.parameters);
+    let all = main.chain(fit.disturbances.iter_mut().map(|d| &mut d.parameters));
+    for (channel, parameters) in all.enumerate() {
+        let Some(l) = parameters.iter_mut().find(|p| p.name == "L_s") else { continue };
+        let around = Around { channel, standard_error_s: l.standard_error, student, variance };
+        let known = by_short_cut.filter(|_| white && !is_wide(stretch, shape, found, around));
+        let interval = known.or_else(|| dead_time_interval(stretch, shape, found, around, &mut work.passes));
+        l.interval_95 = interval.unwrap_or(l.interval_95);
+    }
 }
 
 fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {

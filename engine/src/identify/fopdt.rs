@@ -7,7 +7,7 @@ use super::problem::{FitProblem, Stretch};
 use super::profile::dead_time_interval;
 use super::response::{Dynamics, residuals};
 use super::start::starts;
-use super::statistics::{inverse, student_95};
+use super::statistics::{inverse, student_95, summed};
 use crate::model::Fopdt;
 
 /// Rows above which a start is sought on a thinned-out copy.
@@ -234,7 +234,7 @@ fn report(stretch: &Stretch, best: &Point) -> Option<FopdtFit> {
     let model = Fopdt::new(linear.gain, time_constant_s, dead_time_s).ok()?;
     let (simulated, rss) = free_run(stretch, best.dynamics, linear);
     let rows = stretch.len();
-    let movement: f64 = stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum();
+    let movement = summed(&stretch.y, |y| (y - stretch.y_ref).powi(2));
     let freedom = rows.saturating_sub(stretch.unknowns()).max(1);
     let covariance = covariance(best, rss / freedom as f64);
     let standard_error = Spread {

@@ -6,6 +6,8 @@
 //! (Golub & Pereyra 1973; the step is Kaufman's, 1975). Taking r against the last linear estimate instead of the raw
 //! data keeps the digits that a Gram matrix otherwise squares away.
 
+use super::output_error::dot;
+
 /// Rows a block of columns holds.
 pub(super) const BLOCK: usize = 64;
 const E: usize = 0;
@@ -50,36 +52,35 @@ pub(super) struct Linear {
 
 /// Symmetric inner products of one segment's columns.
 #[derive(Debug, Clone)]
-pub(super) struct Gram([[f64; COLUMNS]; COLUMNS]);
-
-fn dot(a: &[f64; BLOCK], b: &[f64; BLOCK]) -> f64 {
-    let mut lanes = [0.0; 4];
-    for i in (0..BLOCK).step_by(4) {
-        for lane in 0..4 {
-            lanes[lane] += a[i + lane] * b[i + lane];
-        }
-    }
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
+pub(super) struct Gram {
+    products: [[f64; COLUMNS]; COLUMNS],
+    arch: pulp::Arch,
 }
 
+/// Σ a over a block, in eight lanes.
+#[inline(always)]
 fn sum(a: &[f64; BLOCK]) -> f64 {
-    let mut lanes = [0.0; 4];
-    for i in (0..BLOCK).step_by(4) {
-        for lane in 0..4 {
+    let mut lanes = [0.0; 8];
+    for i in (0..BLOCK).step_by(8) {
+        for lane in 0..8 {
             lanes[lane] += a[i + lane];
         }
     }
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3])
+    ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]))
 }
 
-impl Gram {
-    pub fn zero() -> Self {
-        Self([[0.0; COLUMNS]; COLUMNS])
-    }
+/// A block on its way into the products; the same bits whatever the width of this computer's vectors.
+struct Add<'a> {
+    products: &'a mut [[f64; COLUMNS]; COLUMNS],
+    block: &'a Block,
+}
 
-    /// Adds the rows of a block.
-    pub fn add(&mut self, block: &Block) {
-        let g = &mut self.0;
+impl pulp::NullaryFnOnce for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { products: g, block } = self;
         g[ONE][ONE] += block.rows as f64;
         let steady = [(X, &block.x), (XT, &block.xt), (XL, &block.xl), (R, &block.r)];
         for (i, &(column, values)) in steady.iter().enumerate() {
@@ -102,10 +103,21 @@ impl Gram {
             }
         }
     }
+}
+
+impl Gram {
+    pub fn zero() -> Self {
+        Self { products: [[0.0; COLUMNS]; COLUMNS], arch: pulp::Arch::new() }
+    }
+
+    /// Adds the rows of a block.
+    pub fn add(&mut self, block: &Block) {
+        self.arch.dispatch(Add { products: &mut self.products, block });
+    }
 
     fn at(&self, i: usize, j: usize) -> f64 {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
-        self.0[i][j]
+        self.products[i][j]
     }
 
     /// Inner product of columns given as (weight, column) sums.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::FitError;
+use super::statistics::{is_even, mean, summed};
 
 /// Fewest rows a fit accepts: the model has five unknowns.
 const MIN_ROWS: usize = 10;
@@ -193,7 +194,7 @@ fn is_constant(values: &[f64]) -> bool {
 
 fn first_not_finite(values: &[f64]) -> Option<usize> {
     // A sum is finite only when every term is, bar an overflow, which the search then finds harmless.
-    let clean = values.iter().map(|v| v * 0.0).sum::<f64>() == 0.0;
+    let clean = summed(values, |v| v * 0.0) == 0.0;
     if clean { None } else { values.iter().position(|v| !v.is_finite()) }
 }
 
@@ -262,7 +263,7 @@ impl<'a> Stretch<'a> {
         let rows = t.len();
         let even = (t[rows - 1] - t[0]) / (rows - 1) as f64;
         let tolerance = UNIFORM_TOLERANCE * even;
-        let uniform = t.iter().enumerate().all(|(k, &t_k)| (t_k - t[0] - k as f64 * even).abs() <= tolerance);
+        let uniform = is_even(&t, even, tolerance);
         let sample_time_s = if uniform { even } else { typical_step(&t, even) };
         let mut segments = vec![0];
         if !uniform {
@@ -378,18 +379,6 @@ impl<'a> Stretch<'a> {
         }
         (first..last).map(|k| values[k] * (self.t[k + 1] - self.t[k])).sum::<f64>() / length
     }
-}
-
-pub(super) fn mean(values: &[f64]) -> f64 {
-    let mut lanes = [0.0; 4];
-    let chunks = values.chunks_exact(4);
-    let rest: f64 = chunks.remainder().iter().sum();
-    for chunk in chunks {
-        for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane += value;
-        }
-    }
-    (lanes.iter().sum::<f64>() + rest) / values.len() as f64
 }
 
 /// Median of the positive steps; of a sample of them when there are many.

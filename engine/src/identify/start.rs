@@ -3,8 +3,9 @@
 //! With the filtered input z of one T, the sums over z delayed by n rows follow from running sums; only
 //! Σ y z is worked out for each n. So a grid of a thousand points costs less than a pass over the data.
 
-use super::problem::{Stretch, mean};
+use super::problem::Stretch;
 use super::response::Dynamics;
+use super::statistics::mean;
 
 /// Points of the even grid.
 const POINTS: usize = 512;

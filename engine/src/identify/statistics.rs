@@ -43,19 +43,54 @@ pub(super) fn inverse(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j] / (scale[i] * scale[j]))))
 }
 
-/// Step of a quantised signal: the smallest move, when all moves are multiples of it and there are few levels.
+/// Σ f(v), in eight lanes: a plain sum waits for each addition before the next.
+pub(super) fn summed(values: &[f64], f: impl Fn(f64) -> f64) -> f64 {
+    let mut lanes = [0.0; 8];
+    let chunks = values.chunks_exact(8);
+    let rest: f64 = chunks.remainder().iter().map(|v| f(*v)).sum();
+    for chunk in chunks {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane += f(*value);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// Mean of a column that is not empty.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    summed(values, |v| v) / values.len() as f64
+}
+
+/// Whether stamps lie on an even grid of `step_s` to within `tolerance_s`.
+pub(super) fn is_even(time_s: &[f64], step_s: f64, tolerance_s: f64) -> bool {
+    /// Looked at together: a search that may end at every row looks at one a time.
+    const ROWS: usize = 64;
+    time_s.chunks(ROWS).enumerate().all(|(chunk, stamps)| {
+        let first = time_s[0];
+        let place = |i: usize| (chunk * ROWS + i) as f64 * step_s;
+        let off = |i: usize, t: f64| (t - first - place(i)).abs() > tolerance_s;
+        !stamps.iter().enumerate().fold(false, |any, (i, &t)| any | off(i, t))
+    })
+}
+
+/// Step of a quantised signal: the mean of the smallest moves, when all moves are multiples of it and there are few
+/// levels. A converter behind a coarse sensor shifts each level by up to half a code, so that multiples are rough.
 pub(super) fn resolution(values: &[f64]) -> Option<f64> {
     /// Rows looked at.
     const ROWS: usize = 20_000;
+    /// How far a move may lie from a multiple, in steps.
+    const ROUGH: f64 = 0.1;
     let moves = || values.windows(2).take(ROWS).map(|w| (w[1] - w[0]).abs());
     let largest = values.iter().take(ROWS).fold(0.0_f64, |m, v| m.max(v.abs()));
-    let step = moves().filter(|&m| m > 1e-9 * largest).fold(f64::INFINITY, f64::min);
-    if !step.is_finite() {
+    let smallest = moves().filter(|&m| m > 1e-9 * largest).fold(f64::INFINITY, f64::min);
+    if !smallest.is_finite() {
         return None;
     }
+    let single = || moves().filter(|&m| m >= smallest && m < 1.5 * smallest);
+    let step = single().sum::<f64>() / single().count() as f64;
     let whole = |m: f64| {
         let levels = m / step;
-        (levels - levels.round()).abs() < 0.02 * levels.max(1.0) && levels < 1000.0
+        (levels - levels.round()).abs() < ROUGH && levels < 1000.0
     };
     let (mut still, mut total) = (0, 0);
     for m in moves() {
@@ -66,4 +101,22 @@ pub(super) fn resolution(values: &[f64]) -> Option<f64> {
         still += usize::from(m < 0.5 * step);
     }
     (still * 10 > total).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::resolution;
+
+    /// A level in steps of 0.35 cm read by a converter of 0.01465 cm went unnoticed: 23 and 24 codes are no multiples.
+    #[test]
+    fn steps_are_seen_behind_a_converter() {
+        let code = 0.014_65;
+        let read = |y: f64| (((y / 0.35).round() * 0.35) / code).round() * code;
+        let values: Vec<f64> =
+            (0..2000).map(|k| read(3.0 + 4.0 * (0.37 * f64::from(k) / 20.0).sin())).collect();
+        let step = resolution(&values).expect("a step");
+        assert!((step - 0.35).abs() < 0.005, "{step}");
+        let smooth: Vec<f64> = (0..2000).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        assert_eq!(resolution(&smooth), None);
+    }
 }

@@ -2,7 +2,9 @@
 
 use serde_json::{Map, Value, json};
 use vasos_engine::explain::number;
-use vasos_engine::identify::{ControllerFit, LoopStudy, ModelFit, Parameter, Structure};
+use vasos_engine::identify::{
+    ControllerFit, CurveMethod, LoopStudy, ModelFit, Parameter, ReactionCurve, Structure,
+};
 use vasos_io::log::ImportedLog;
 
 use super::Chosen;
@@ -13,6 +15,7 @@ pub(super) fn of(
     as_json: bool,
     chosen: &Chosen,
     study: &LoopStudy,
+    curve: Option<&ReactionCurve>,
     log: &ImportedLog,
     mut warnings: Vec<String>,
 ) -> Answer {
@@ -29,17 +32,24 @@ pub(super) fn of(
     };
     let status = u8::from(!usable);
     if as_json {
-        let text = json::text(&whole(chosen, study, &repairs, &warnings));
+        let text = json::text(&whole(chosen, study, curve, &repairs, &warnings));
         return Answer { text, remarks, status };
     }
     let mut text = text(chosen, study);
+    text.push_str(&curve.map_or_else(String::new, curve_text));
     for line in warnings.iter().chain(&repairs) {
         text.push_str(&format!("note: {line}\n"));
     }
     Answer { text, remarks, status }
 }
 
-fn whole(chosen: &Chosen, study: &LoopStudy, repairs: &[String], warnings: &[String]) -> Value {
+fn whole(
+    chosen: &Chosen,
+    study: &LoopStudy,
+    curve: Option<&ReactionCurve>,
+    repairs: &[String],
+    warnings: &[String],
+) -> Value {
     let models: Vec<Value> = study.choice.iter().flat_map(|c| &c.fits).map(model).collect();
     let structure = |fit: &ModelFit| fit.structure.key();
     let choice = study.choice.as_ref().ok();
@@ -57,6 +67,10 @@ fn whole(chosen: &Chosen, study: &LoopStudy, repairs: &[String], warnings: &[Str
             "period_s": o.period_s, "regularity": o.regularity, "stiction_index": o.stiction_index,
             "stiction_band": o.stiction_band, "sticks": o.sticks(),
         })),
+        "reaction_curve": curve.map(|c| c.estimates.iter().map(|e| json!({
+            "method": e.method.key(), "K": e.model.gain, "T_s": e.model.time_constant_s,
+            "L_s": e.model.dead_time_s, "r2": e.r2,
+        })).collect::<Vec<_>>()),
         "repairs": repairs,
         "warnings": warnings,
     })
@@ -119,6 +133,24 @@ fn controller(c: &ControllerFit) -> Value {
         "Kc": c.kc, "Ti_s": c.ti_s, "Td_s": c.td_s, "b": c.setpoint_weight, "r2": c.r2, "rows": c.rows,
         "interval_95": {"Kc": c.kc_interval_95, "Ti_s": c.ti_interval_95, "Td_s": c.td_interval_95},
     })
+}
+
+fn curve_text(curve: &ReactionCurve) -> String {
+    let mut rows = vec![["reaction curve", "K", "T (s)", "L (s)", "R²"].map(str::to_owned).to_vec()];
+    for e in &curve.estimates {
+        let way = match e.method {
+            CurveMethod::Tangent => "tangent",
+            CurveMethod::TwoPoints => "two points",
+            CurveMethod::Onset => "begin and 63.2 %",
+            CurveMethod::Area => "area",
+            CurveMethod::LeastSquares => "least squares",
+        };
+        let numbers = [e.model.gain, e.model.time_constant_s, e.model.dead_time_s, e.r2];
+        let mut row = vec![way.to_owned()];
+        row.extend(numbers.map(|value| shown(Some(value))));
+        rows.push(row);
+    }
+    table(&rows)
 }
 
 fn between(interval: [f64; 2]) -> String {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use vasos_engine::identify::{
     Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModelFit, Structure, StudyOptions,
-    study_loop,
+    reaction_curve, study_loop,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
 use vasos_io::log::{ImportOptions, ImportedLog, import_log};
@@ -33,6 +33,7 @@ Examples:
   vasos identify loop.csv --structure sopdt --disturbance feed --drift linear
   vasos identify loop.csv --mv u0+du --mv-min 0 --mv-max 60
 Columns that are not named are proposed from their names and behaviour. COL is a name or an expression of names.
+A stretch with one step of the MV between two rests also gets the estimates of the reaction curve.
 With a setpoint and an automatic mode the gains of the controller at work are read from the log as well.
 Exit status 1: the log can be read, but no model can be told from it.")]
 pub struct Arguments {
@@ -117,6 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     problem.options = fit_options;
     let others = chosen.disturbances.iter().zip(&rows.columns[2..]);
     problem.disturbances = others.map(|(name, values)| Disturbance { name: name.clone(), values }).collect();
+    let curve = reaction_curve(&problem);
     let record = LoopRecord { problem, sp: stretch.sp.as_deref(), mode: stretch.mode.as_deref() };
     let study = study_loop(&record, &options).map_err(Refusal::of)?;
     if let Err(error) = &study.choice
@@ -128,7 +130,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     if !rows.left_out.is_empty() {
         warnings.push(format!("{} rows without a value were left out", rows.left_out.len()));
     }
-    Ok(answer::of(arguments.json, &chosen, &study, &log, warnings))
+    if let Err(error) = &curve
+        && error.is_one_step()
+    {
+        warnings.push(format!("no reaction curve: {error}"));
+    }
+    Ok(answer::of(arguments.json, &chosen, &study, curve.ok().as_ref(), &log, warnings))
 }
 
 fn study_options(arguments: &Arguments) -> Result<StudyOptions, Refusal> {

@@ -40,23 +40,17 @@ impl Columns {
 pub(in crate::identify) struct Gram {
     count: usize,
     products: Vec<f64>,
+    arch: pulp::Arch,
 }
 
 impl Gram {
     pub fn zero(count: usize) -> Self {
-        Self { count, products: vec![0.0; count * count] }
+        Self { count, products: vec![0.0; count * count], arch: pulp::Arch::new() }
     }
 
     /// Adds the rows of a block.
     pub fn add(&mut self, columns: &Columns) {
-        for i in (0..self.count).filter(|&i| columns.alive[i]) {
-            let row = &mut self.products[i * self.count..(i + 1) * self.count];
-            let a = &columns.values[i];
-            let others = columns.values.iter().zip(&columns.alive);
-            for (sum, (b, _)) in row.iter_mut().zip(others).skip(i).filter(|(_, (_, alive))| **alive) {
-                *sum += dot(a, b);
-            }
-        }
+        self.arch.dispatch(Add { count: self.count, products: &mut self.products, columns });
     }
 
     pub fn at(&self, i: usize, j: usize) -> f64 {
@@ -64,7 +58,33 @@ impl Gram {
     }
 }
 
-fn dot(a: &[f64; ROWS], b: &[f64; ROWS]) -> f64 {
+/// A block on its way into the products, in the widest vectors of this computer. Sums are taken in eight lanes whatever
+/// the width and nothing is fused, so that every computer gives the same bits.
+struct Add<'a> {
+    count: usize,
+    products: &'a mut [f64],
+    columns: &'a Columns,
+}
+
+impl pulp::NullaryFnOnce for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Columns { values, alive, .. } = self.columns;
+        for i in (0..self.count).filter(|&i| alive[i]) {
+            let row = &mut self.products[i * self.count..(i + 1) * self.count];
+            let others = values.iter().zip(alive);
+            for (sum, (b, _)) in row.iter_mut().zip(others).skip(i).filter(|(_, (_, alive))| **alive) {
+                *sum += dot(&values[i], b);
+            }
+        }
+    }
+}
+
+/// Σ a b over a block, in eight lanes.
+#[inline(always)]
+pub(in crate::identify) fn dot(a: &[f64; ROWS], b: &[f64; ROWS]) -> f64 {
     let mut lanes = [0.0; 8];
     for i in (0..ROWS).step_by(8) {
         for (lane, sum) in lanes.iter_mut().enumerate() {

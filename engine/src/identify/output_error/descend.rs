@@ -78,6 +78,18 @@ pub(in crate::identify) fn refine(
     passes: usize,
     count: &mut usize,
 ) -> Option<Found> {
+    refine_holding(stretch, shape, start, passes, None, count)
+}
+
+/// The same with one unknown held where it is.
+pub(in crate::identify) fn refine_holding(
+    stretch: &Stretch,
+    shape: &Shape,
+    start: &[Point],
+    passes: usize,
+    fixed: Option<usize>,
+    count: &mut usize,
+) -> Option<Found> {
     let bounds = Bounds::of(stretch);
     let clip = |points: &[Point]| -> Vec<Point> {
         points.iter().zip(&shape.channels).map(|(p, order)| bounds.clip(*order, *p)).collect()
@@ -88,7 +100,7 @@ pub(in crate::identify) fn refine(
     let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
     let mut damping = 1e-6;
     for _ in 1..passes {
-        let reduced = Reduced::of(&best.projected, &held(shape, &best.points));
+        let reduced = Reduced::of(&best.projected, &held(shape, &best.points, fixed));
         let step = reduced.step(damping);
         let target = clip(&moved(shape, &best.points, &step));
         let taken = difference(shape, &best.points, &target);
@@ -111,7 +123,7 @@ pub(in crate::identify) fn refine(
 }
 
 /// For each unknown: which way it may not go.
-fn held(shape: &Shape, points: &[Point]) -> Vec<Side> {
+fn held(shape: &Shape, points: &[Point], fixed: Option<usize>) -> Vec<Side> {
     let mut out = Vec::with_capacity(shape.unknowns);
     for (order, p) in shape.channels.iter().zip(points) {
         if let Order::Second { .. } = order {
@@ -128,6 +140,9 @@ fn held(shape: &Shape, points: &[Point]) -> Vec<Side> {
         }
         out.push(if p.dead_time_s <= 0.0 { Side::Down } else { Side::None });
     }
+    if let Some(fixed) = fixed {
+        out[fixed] = Side::Both;
+    }
     out
 }
 
@@ -136,6 +151,7 @@ enum Side {
     None,
     Down,
     Up,
+    Both,
 }
 
 fn moved(shape: &Shape, points: &[Point], step: &[f64]) -> Vec<Point> {
@@ -210,11 +226,12 @@ impl Reduced {
     /// Damped step; an unknown at its bound that would leave it stays.
     fn step(&self, damping: f64) -> Vec<f64> {
         let n = self.g.len();
-        let mut free: Vec<usize> = (0..n).filter(|&i| self.h.at(i, i) > 0.0).collect();
+        let mut free: Vec<usize> =
+            (0..n).filter(|&i| self.h.at(i, i) > 0.0 && self.held[i] != Side::Both).collect();
         loop {
             let step = self.solve(damping, &free);
             let leaving = free.iter().position(|&i| match self.held[i] {
-                Side::None => false,
+                Side::None | Side::Both => false,
                 Side::Down => step[i] <= 0.0,
                 Side::Up => step[i] >= 0.0,
             });

@@ -298,7 +298,10 @@ impl Modes {
 
     fn fill_second(&mut self, s: &Stretch, first: usize, rows: usize, columns: &mut Columns) {
         let Point { time_s, zeta, .. } = self.point;
-        let at = |k: usize| Exponential::new((s.t[k] - self.start_s) / time_s, zeta);
+        let at = |k: usize| {
+            let whole = Exponential::new((s.t[k] - self.start_s) / time_s, zeta);
+            UpperRow { e: whole.e[0], by_tau: whole.by_tau[0], by_zeta: whole.by_zeta[0] }
+        };
         let step = Exponential::new(s.sample_time_s / time_s, zeta);
         let mut now = at(first);
         let mut last = 0.0;
@@ -306,34 +309,33 @@ impl Modes {
             if i > 0 {
                 now = if s.uniform { carried(&now, &step) } else { at(first + i) };
             }
-            let rows_of = [
-                now.e[0][0],
-                now.by_tau[0][0],
-                now.by_zeta[0][0],
-                now.e[0][1],
-                now.by_tau[0][1],
-                now.by_zeta[0][1],
-            ];
+            let UpperRow { e, by_tau, by_zeta } = &now;
+            let rows_of = [e[0], by_tau[0], by_zeta[0], e[1], by_tau[1], by_zeta[1]];
             for (column, value) in columns.values[self.column..].iter_mut().zip(rows_of) {
                 column[i] = value;
             }
-            last = now.e[0][0].abs() + now.e[0][1].abs() + now.e[1][0].abs() + now.e[1][1].abs();
+            last = now.e[0].abs() + now.e[1].abs();
         }
         self.gone = last < GONE;
     }
 }
 
-/// E(s + h) from E(s) and E(h), with its derivatives by the product rule.
-fn carried(now: &Exponential, step: &Exponential) -> Exponential {
-    let multiply = |a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]| -> [[f64; 2]; 2] {
-        std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+/// The upper row of E(s + h) from that of E(s) and from E(h), with its derivatives by the product rule.
+fn carried(now: &UpperRow, step: &Exponential) -> UpperRow {
+    let times = |a: [f64; 2], b: &[[f64; 2]; 2]| -> [f64; 2] {
+        std::array::from_fn(|j| a[0] * b[0][j] + a[1] * b[1][j])
     };
-    let sum = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| -> [[f64; 2]; 2] {
-        std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
-    };
-    Exponential {
-        e: multiply(&now.e, &step.e),
-        by_tau: sum(multiply(&now.by_tau, &step.e), multiply(&now.e, &step.by_tau)),
-        by_zeta: sum(multiply(&now.by_zeta, &step.e), multiply(&now.e, &step.by_zeta)),
+    let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+    UpperRow {
+        e: times(now.e, &step.e),
+        by_tau: sum(times(now.by_tau, &step.e), times(now.e, &step.by_tau)),
+        by_zeta: sum(times(now.by_zeta, &step.e), times(now.e, &step.by_zeta)),
     }
+}
+
+/// What an exponential says of the output: its upper row.
+struct UpperRow {
+    e: [f64; 2],
+    by_tau: [f64; 2],
+    by_zeta: [f64; 2],
 }

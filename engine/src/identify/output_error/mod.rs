@@ -9,12 +9,15 @@ mod descend;
 mod fill;
 mod kernel;
 mod matrix2;
+mod profile;
 mod project;
 mod search;
 mod shape;
 
+pub(super) use columns::dot;
 pub(super) use descend::{Found, evaluate};
 pub(super) use fill::blocks;
+pub(super) use profile::{Around, dead_time_interval, is_wide};
 pub(super) use project::Symmetric;
 pub(super) use search::{Near, Work, search};
 pub(super) use shape::{Linear, Order, Point, Shape};
