@@ -358,6 +358,17 @@ fn other_rigs_languages_and_logs_look_as_they_did() {
     harness.remove_cursor();
     harness.run_steps(3);
     picture(&mut harness, "log_identified");
+    act(&mut harness, Action::Maximise(PaneKind::Identify));
+    for (label, name) in
+        [("Reaction curve", "identify_curve"), ("Step", "identify_step"), ("Tests", "identify_tests")]
+    {
+        harness.run_steps(2);
+        harness.get_by_label(&format!("Picture: {label}")).click();
+        harness.run_steps(3);
+        harness.remove_cursor();
+        harness.run_steps(2);
+        picture(&mut harness, name);
+    }
     results.extend_harness(&mut harness);
 }
 

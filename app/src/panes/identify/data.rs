@@ -5,7 +5,8 @@ use std::sync::Arc;
 use vasos_engine::document::{Document, FittedRows, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
 use vasos_engine::excitation::{ExcitationReport, identify_report};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, Structure, StudyOptions, study_loop,
+    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, Structure, StudyOptions,
+    reaction_curve, study_loop,
 };
 use vasos_engine::signal::{ChannelKind, LogColumn, LogTable};
 
@@ -188,7 +189,9 @@ pub fn of_report(report: &ExcitationReport, mv_unit: String) -> Outcome {
     let record = &report.record;
     let end = |at: Option<&f64>| at.copied().unwrap_or(report.start_s);
     let stretch = Stretch { from_s: end(record.time_s.first()), to_s: end(record.time_s.last()) };
-    let study = LoopStudy { choice: Ok(told.choice), controller: None, oscillation: None, findings: vec![] };
+    let reaction_curve = reaction_curve(&FitProblem::new(&record.time_s, &record.pv, &record.mv)).ok();
+    let choice = Ok(told.choice);
+    let study = LoopStudy { choice, controller: None, oscillation: None, reaction_curve, findings: vec![] };
     Outcome::Model(Box::new(NewModel {
         model: fit.model.clone(),
         origin: ModelOrigin::Run { tag: report.tag.clone(), stretch },

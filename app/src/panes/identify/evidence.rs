@@ -25,6 +25,8 @@ pub enum Picture {
     Step,
     /// Correlations of the residuals with their bands.
     Tests,
+    /// What the classical ways read off a step, together on it.
+    Curve,
 }
 
 pub fn ui(ui: &mut egui::Ui, entry: &ModelEntry, picture: &mut Picture, actions: &mut Vec<Action>) {
@@ -37,7 +39,7 @@ pub fn ui(ui: &mut egui::Ui, entry: &ModelEntry, picture: &mut Picture, actions:
     };
     verdict(ui, fit.verdict());
     if let Some(rows) = &entry.rows {
-        pictures(ui, entry, fit, rows, picture);
+        pictures(ui, entry, fit, rows, picture, actions);
     }
     for other in fit.verdicts.iter().skip(1) {
         verdict(ui, other);
@@ -52,19 +54,37 @@ pub fn ui(ui: &mut egui::Ui, entry: &ModelEntry, picture: &mut Picture, actions:
     }
 }
 
-fn pictures(ui: &mut egui::Ui, entry: &ModelEntry, fit: &ModelFit, rows: &FittedRows, picture: &mut Picture) {
-    let pictures = [Picture::Data, Picture::Residuals, Picture::Step, Picture::Tests];
-    let labels =
-        [tr!("identify.data"), tr!("identify.residuals"), tr!("identify.step"), tr!("identify.tests")];
-    let chosen = pictures.iter().position(|x| x == picture).unwrap_or(0);
-    if let Some(pressed) = segmented(ui, &tr!("identify.picture"), &labels, chosen) {
-        *picture = pictures[pressed];
+fn pictures(
+    ui: &mut egui::Ui,
+    entry: &ModelEntry,
+    fit: &ModelFit,
+    rows: &FittedRows,
+    picture: &mut Picture,
+    actions: &mut Vec<Action>,
+) {
+    let curve = entry.study.as_ref().and_then(|study| study.reaction_curve.as_ref());
+    let mut pictures = vec![
+        (Picture::Data, tr!("identify.data")),
+        (Picture::Residuals, tr!("identify.residuals")),
+        (Picture::Step, tr!("identify.step")),
+        (Picture::Tests, tr!("identify.tests")),
+    ];
+    if curve.is_some() {
+        pictures.push((Picture::Curve, tr!("identify.curve")));
     }
-    match picture {
-        Picture::Data => overlay(ui, entry, fit, rows),
-        Picture::Residuals => residuals(ui, entry, fit, rows),
-        Picture::Step => step(ui, entry, fit),
-        Picture::Tests => tests(ui, fit),
+    let labels: Vec<String> = pictures.iter().map(|(_, label)| label.clone()).collect();
+    let chosen = pictures.iter().position(|(x, _)| x == picture).unwrap_or(0);
+    ui.horizontal_wrapped(|ui| {
+        if let Some(pressed) = segmented(ui, &tr!("identify.picture"), &labels, chosen) {
+            *picture = pictures[pressed].0;
+        }
+    });
+    match (*picture, curve) {
+        (Picture::Residuals, _) => residuals(ui, entry, fit, rows),
+        (Picture::Step, _) => step(ui, entry, fit),
+        (Picture::Tests, _) => tests(ui, fit),
+        (Picture::Curve, Some(curve)) => super::curve::ui(ui, entry, rows, curve, actions),
+        (Picture::Data | Picture::Curve, _) => overlay(ui, entry, fit, rows),
     }
 }
 
@@ -134,12 +154,12 @@ fn controller_words(c: &ControllerFit) -> String {
 }
 
 /// Points of a curve that a screen can show.
-fn thinned(time_s: &[f64], values: &[f64]) -> PlotPoints<'static> {
+pub(super) fn thinned(time_s: &[f64], values: &[f64]) -> PlotPoints<'static> {
     let thin = (time_s.len() / 1500).max(1);
     time_s.iter().zip(values).step_by(thin).map(|(t, v)| [*t, *v]).collect::<Vec<[f64; 2]>>().into()
 }
 
-fn legend(ui: &mut egui::Ui, entries: &[(String, Color32)]) {
+pub(super) fn legend(ui: &mut egui::Ui, entries: &[(String, Color32)]) {
     ui.horizontal(|ui| {
         for (words, colour) in entries {
             let (rect, _) = ui.allocate_exact_size(egui::vec2(14.0, 10.0), egui::Sense::hover());
@@ -149,7 +169,7 @@ fn legend(ui: &mut egui::Ui, entries: &[(String, Color32)]) {
     });
 }
 
-fn frame(ui: &egui::Ui, name: &'static str, y: String) -> Plot<'static> {
+pub(super) fn frame(ui: &egui::Ui, name: &'static str, y: String) -> Plot<'static> {
     let p = theme::palette(ui);
     Plot::new(name)
         .height(ui.available_height().clamp(160.0, 420.0))
@@ -159,14 +179,14 @@ fn frame(ui: &egui::Ui, name: &'static str, y: String) -> Plot<'static> {
         .y_grid_spacer(plots::y_marks)
 }
 
-fn clock_axis(plot: Plot<'static>) -> Plot<'static> {
+pub(super) fn clock_axis(plot: Plot<'static>) -> Plot<'static> {
     plot.custom_x_axes(vec![
         plots::x_axis(tr!("trend.time_axis")).formatter(|mark, _| text::clock(mark.value)),
     ])
     .x_grid_spacer(plots::time_marks)
 }
 
-fn unit_of(entry: &ModelEntry) -> String {
+pub(super) fn unit_of(entry: &ModelEntry) -> String {
     if entry.pv_unit.is_empty() { String::new() } else { format!(" [{}]", entry.pv_unit) }
 }
 

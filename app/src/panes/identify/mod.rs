@@ -1,5 +1,6 @@
 //! From a stretch of data to a model: columns, stretch, fit, models in a table, what speaks for and against them.
 
+mod curve;
 mod data;
 mod evidence;
 mod excite;

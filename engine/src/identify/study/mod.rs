@@ -16,7 +16,10 @@ pub use controller::ControllerFit;
 pub use finding::RecordFinding;
 pub use stiction::Oscillation;
 
-use super::{Choice, FitError, FitProblem, FitVerdict, Structure, choose_among, choose_from_rest};
+use super::{
+    Choice, FitError, FitProblem, FitVerdict, ReactionCurve, Structure, choose_among, choose_from_rest,
+    reaction_curve,
+};
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
 use condition::{condition, mended, slips};
@@ -52,6 +55,8 @@ pub struct LoopStudy {
     pub controller: Option<ControllerFit>,
     /// Regular oscillation, where there is one.
     pub oscillation: Option<Oscillation>,
+    /// Estimates of the reaction curve, where the stretch is one step between two rests.
+    pub reaction_curve: Option<ReactionCurve>,
     /// What else was seen.
     pub findings: Vec<RecordFinding>,
 }
@@ -124,7 +129,8 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
         of_the_loop(controller, choice, &mut findings);
     }
     let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
-    Ok(LoopStudy { choice, controller, oscillation, findings })
+    let reaction_curve = reaction_curve(&problem).ok();
+    Ok(LoopStudy { choice, controller, oscillation, reaction_curve, findings })
 }
 
 fn one_row_earlier(mv: &[f64]) -> Vec<f64> {
