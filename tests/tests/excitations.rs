@@ -10,6 +10,7 @@ use vasos_engine::excitation::{
     AtRest, Ending, Excitation, ExcitationError, ExcitationReport, Finding, Hysteresis, Phase, Relay, Signal,
     StepEnd, StopReason, UltimateGain, identify_report,
 };
+use vasos_engine::model::ProcessModel;
 use vasos_engine::plant::{Fault, Measurement, Network, Plant, Reading, ReadingStatus, RigError};
 use vasos_engine::session::{CommandError, EventKind, Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::sim::{ClosedLoop, run_excitation};
@@ -56,7 +57,7 @@ fn a_relay_on_the_noisy_rig_tells_the_ultimate_gain_by_its_model() {
     assert_eq!(report.ending, Ending::Finished);
     let Finding::Relay(cycle) = report.finding else { panic!("no cycle") };
     let told = identify_report(&report).expect("a model");
-    println!("{cycle:?}\n{:?} {} %\n{:?} {exact:?}", told.fit.model, told.fit.fit_percent, told.ultimate);
+    println!("{cycle:?}\n{:?} {} %\n{:?} {exact:?}", told.fit().model, told.fit().fit_percent, told.ultimate);
     let ultimate = told.ultimate.expect("a limit");
     assert!(cycle.ku < 0.3 * exact.ku && told.warnings.is_empty());
     assert!((ultimate.ku / exact.ku - 1.0).abs() < 0.3 && (ultimate.pu_s / exact.pu_s - 1.0).abs() < 0.3);
@@ -130,7 +131,9 @@ fn a_live_source_is_tested_through_the_same_trait() {
     let report = to_its_end(&mut live);
     assert_eq!(report.ending, Ending::Finished);
     assert_eq!(live.loops()[0].control.mv(), 2.0);
-    let model = identify_report(&report).expect("a model").fit.model;
+    let ProcessModel::Fopdt(model) = identify_report(&report).expect("a model").fit().model else {
+        panic!("no first order")
+    };
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
     assert!(near(model.gain, 4.0) && near(model.time_constant_s, 40.0), "{model:?}");
     assert!(near(model.dead_time_s, 3.0), "{model:?}");

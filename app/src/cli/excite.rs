@@ -255,18 +255,11 @@ fn as_json(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Valu
         Ending::Stopped(reason) => json!(reason.to_string()),
     };
     let model = told.and_then(|t| t.as_ref().ok()).map(|told| {
-        let (m, i) = (&told.fit.model, &told.fit.interval_95);
-        json!({
-            "structure": "fopdt",
-            "K": m.gain,
-            "T_s": m.time_constant_s,
-            "L_s": m.dead_time_s,
-            "interval_95": {"K": i.gain, "T_s": i.time_constant_s, "L_s": i.dead_time_s},
-            "fit_percent": told.fit.fit_percent,
-            "verdict": told.verdicts.first().map(ToString::to_string),
-            "Ku": told.ultimate.map(|u| u.ku),
-            "Pu_s": told.ultimate.map(|u| u.pu_s),
-        })
+        let mut model = super::identify::model_json(told.fit());
+        for (key, value) in [("Ku", told.ultimate.map(|u| u.ku)), ("Pu_s", told.ultimate.map(|u| u.pu_s))] {
+            model[key] = json!(value);
+        }
+        model
     });
     let of_model = told.and_then(|t| t.as_ref().ok()).into_iter().flat_map(|told| &told.warnings);
     let warnings: Vec<String> = report.warnings().iter().chain(of_model).map(ToString::to_string).collect();
@@ -339,23 +332,15 @@ fn as_text(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Stri
 }
 
 fn model_text(told: &Identified) -> String {
-    let (m, i) = (&told.fit.model, &told.fit.interval_95);
-    let row = |name: &str, value: f64, interval: [f64; 2]| {
-        let between = format!("{} to {}", number(interval[0]), number(interval[1]));
-        vec![name.to_owned(), number(value), between]
-    };
     let single = |name: &str, value: Option<f64>| vec![name.to_owned(), shown(value)];
-    let rows = [
-        vec!["fopdt of the record".to_owned(), String::new(), "95 % interval".to_owned()],
-        row("K", m.gain, i.gain),
-        row("T (s)", m.time_constant_s, i.time_constant_s),
-        row("L (s)", m.dead_time_s, i.dead_time_s),
-        single("fit (%)", Some(told.fit.fit_percent)),
+    let mut rows = super::identify::model_rows(told.fit());
+    rows.extend([
+        single("fit (%)", Some(told.fit().fit_percent)),
         single("Ku of the model", told.ultimate.map(|u| u.ku)),
         single("Pu of the model (s)", told.ultimate.map(|u| u.pu_s)),
-    ];
+    ]);
     let mut text = table(&rows);
-    for verdict in &told.verdicts {
+    for verdict in &told.fit().verdicts {
         text.push_str(&format!("{verdict}\n"));
     }
     for warning in &told.warnings {

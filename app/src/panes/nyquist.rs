@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Polygon, Text};
+use num_complex::Complex64;
 use vasos_engine::analyze::{CurveOptions, LoopFunction, OpenLoop, frequency_curve};
 use vasos_engine::control::PidGains;
 use vasos_engine::model::ProcessModel;
@@ -54,6 +55,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let ghost = present.map(|r| state.curve(model, &r.gains));
     let names = [tr!("nyquist.loop"), tr!("rules.present")];
     let hover = curve.clone();
+    let ellipses = uncertainty(view, model, &row.gains, &curve);
     Plot::new("nyquist")
         .data_aspect(1.0)
         .allow_scroll(false)
@@ -89,12 +91,49 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             if let Some(ghost) = ghost {
                 plot.line(Line::new(names[1].clone(), plane(&ghost)).color(p.ghost).width(1.2));
             }
+            for ellipse in &ellipses {
+                let fill = Polygon::new(tr!("nyquist.band"), PlotPoints::from(ellipse.clone()));
+                plot.polygon(
+                    fill.fill_color(p.pv.gamma_multiply(0.10))
+                        .stroke(egui::Stroke::new(0.6, p.pv.gamma_multiply(0.35)))
+                        .allow_hover(false),
+                );
+            }
             plot.line(Line::new(names[0].clone(), plane(&curve)).color(p.pv).width(theme::LINE));
             plot.points(Points::new("−1", vec![[-1.0, 0.0]]).radius(4.5).color(p.alarm));
             let label = RichText::new("−1").color(p.text).size(theme::BODY);
             plot.text(Text::new("", PlotPoint::new(-1.0, 0.16), label));
         });
     vec![]
+}
+
+/// 95 % ellipses of the fitted process along the loop's curve, where they can be seen.
+fn uncertainty(
+    view: &View,
+    model: &ProcessModel,
+    gains: &PidGains,
+    curve: &[[f64; 3]],
+) -> Vec<Vec<[f64; 2]>> {
+    const ELLIPSES: usize = 28;
+    const CORNERS: u32 = 40;
+    let fit = view.document.model().and_then(|entry| entry.fit.as_ref()).filter(|fit| fit.model == *model);
+    let Some(fit) = fit else { return vec![] };
+    let near: Vec<f64> = curve.iter().filter(|q| q[0].hypot(q[1]) < 4.0).map(|q| q[2]).collect();
+    let omega: Vec<f64> = near.iter().copied().step_by((near.len() / ELLIPSES).max(1)).collect();
+    let open = OpenLoop::new(model, gains);
+    let seen = fit.nyquist_band(&omega).into_iter().filter(|band| band.semi_axes[0].is_finite());
+    seen.map(|band| {
+        let controller = open.controller_at_omega(band.omega_rad_s);
+        (0..CORNERS)
+            .map(|k| {
+                let angle = f64::from(k) * std::f64::consts::TAU / f64::from(CORNERS);
+                let along = Complex64::new(band.semi_axes[0] * angle.cos(), band.semi_axes[1] * angle.sin());
+                let point = controller * (band.value + along * Complex64::from_polar(1.0, band.angle_rad));
+                [point.re, point.im]
+            })
+            .collect()
+    })
+    .collect()
 }
 
 fn plane(curve: &[[f64; 3]]) -> PlotPoints<'static> {

@@ -9,10 +9,12 @@ mod topbar;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use eframe::egui;
-use vasos_engine::document::{Document, History, SourceChoice};
-use vasos_engine::session::{Session, SessionCommand};
+use vasos_engine::document::{Document, DocumentCommand, History, SourceChoice};
+use vasos_engine::excitation::{Ending, ExcitationReport, Signal, StepEnd};
+use vasos_engine::session::{EventKind, Session, SessionCommand};
 use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
@@ -181,6 +183,9 @@ impl Workbench {
         let events: Vec<_> = self.session.events().collect();
         for event in events {
             self.run.note(&event);
+            if let EventKind::ExcitationEnded(report) = &event.kind {
+                self.take_report(ctx, report.clone());
+            }
             journal::add(&mut self.journal, journal::of_event(&event));
         }
         self.take_results(ctx);
@@ -192,6 +197,26 @@ impl Workbench {
             }
         }
         self.set_title(ctx);
+    }
+
+    /// Keeps what a test of the loop measured, and fits its record where the loop was moved.
+    fn take_report(&mut self, ctx: &egui::Context, report: Arc<ExcitationReport>) {
+        // A setpoint that a test leaves behind is a setting like one that was typed.
+        if let (Ending::Finished, Signal::SetpointStep { end: StepEnd::Stay, .. }) =
+            (&report.ending, &report.excitation.signal)
+            && let Some(&level_cm) = report.record.setpoint.last()
+        {
+            let change = DocumentCommand::Setpoint(report.tag.clone(), level_cm);
+            self.act(ctx, Action::Document(change));
+        }
+        self.states.identify.bench.report = Some(report.clone());
+        if report.moved_at_s.is_none() {
+            return;
+        }
+        let snapshot = self.session.snapshot();
+        let pump = snapshot.loops.iter().find(|l| l.tag == report.tag).map(|l| l.pump);
+        let unit = pump.map_or("", |pump| snapshot.network.spec.pumps[pump].unit.symbol()).to_owned();
+        self.jobs.start("fit", move || crate::panes::identify::of_report(&report, unit));
     }
 
     /// One frame.

@@ -6,8 +6,7 @@ use super::progress::Envelope;
 use super::spec::{Excitation, Signal};
 use super::stop::StopReason;
 use crate::explain::{Explain, number};
-use crate::identify::{FitError, FitProblem, FitVerdict, FopdtFit, Structure, fit_fopdt, fit_model};
-use crate::model::ProcessModel;
+use crate::identify::{Choice, FitError, FitProblem, ModelFit, Structure, choose_from_rest};
 use crate::tune::{Ultimate, ultimate};
 
 /// ε/a above which 4d/(πa) and its like are far from the ultimate point: at 0.3 the ultimate gain is 40 % low.
@@ -251,32 +250,37 @@ impl ExcitationWarning {
 /// The model that a record tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
-    /// First order with dead time, with its intervals and verdicts.
-    pub fit: FopdtFit,
-    /// What the fit has to say, most important first; never empty.
-    pub verdicts: Vec<FitVerdict>,
+    /// First order or integrator with dead time, whichever the record speaks for, best first.
+    pub choice: Choice,
     /// Ku and Pu of that model; absent where no proportional gain brings it to its limit.
     pub ultimate: Option<Ultimate>,
     /// What has to be said about it besides the verdicts of the fit.
     pub warnings: Vec<ExcitationWarning>,
 }
 
-/// Fits a first-order model with dead time to the record of a test by output error.
+impl Identified {
+    /// The fit chosen.
+    #[must_use]
+    pub fn fit(&self) -> &ModelFit {
+        self.choice.chosen()
+    }
+}
+
+/// Fits a first order and an integrator with dead time to the record of a test by output error.
 ///
 /// # Errors
 /// [`FitError`] of the record.
 pub fn identify_report(report: &ExcitationReport) -> Result<Identified, FitError> {
     let Record { time_s, pv, mv, .. } = &report.record;
     let problem = FitProblem::new(time_s, pv, mv);
-    let fit = fit_fopdt(&problem)?;
-    let verdicts = fit_model(&problem, Structure::Fopdt)?.verdicts;
-    let ultimate = ultimate(&ProcessModel::Fopdt(fit.model));
+    let choice = choose_from_rest(&problem, &[Structure::Fopdt, Structure::Ipdt]).0?;
+    let fit = choice.chosen();
     let found = match &report.finding {
         Finding::Relay(relay) => Some(relay.ku),
         Finding::Ultimate(found) => Some(found.ku),
         _ => None,
     };
-    let gain = fit.model.gain;
+    let gain = fit.parameters[0].value;
     let turned = found.filter(|ku| ku * gain < 0.0).map(|_| ExcitationWarning::OtherSign { gain });
-    Ok(Identified { fit, verdicts, ultimate, warnings: turned.into_iter().collect() })
+    Ok(Identified { ultimate: ultimate(&fit.model), warnings: turned.into_iter().collect(), choice })
 }

@@ -54,12 +54,19 @@ impl Choice {
 ///
 /// Source: Schwarz, Annals of Statistics 6 (1978) 461; Ljung, System Identification, 2nd ed., 16.4.
 pub fn choose_model(problem: &FitProblem) -> Result<Choice, FitError> {
+    choose_among(problem, &Structure::CHOICE)
+}
+
+/// [`choose_model`] among some structures, each after those whose dynamics start it.
+///
+/// # Errors
+/// As there.
+pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Choice, FitError> {
     let stretch = problem.stretch()?;
     let drift = problem.options.drift == Drift::Linear;
     let mut fits: Vec<ModelFit> = Vec::new();
     let mut first_error = None;
-    // First order first: its dynamics start the others.
-    for structure in [Structure::Fopdt, Structure::Ipdt, Structure::Sopdt, Structure::SopdtZero] {
+    for &structure in structures {
         let point = |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
         let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
         let near = Near { first: point(Structure::Fopdt), same };

@@ -56,14 +56,20 @@ fn half_percent(p: &Parameter) -> f64 {
 
 fn parameters(fit: &ModelFit, stretch: &Stretch, found: &mut Vec<FitVerdict>) {
     let moved = movement(stretch);
-    let gain = half_percent(&fit.parameters[0]);
+    let gain =
+        if moves_nothing(fit, stretch, moved) { f64::INFINITY } else { half_percent(&fit.parameters[0]) };
     let slowest = fit.parameter("T_s").map_or(0.0, |t| t.value);
     if slowest > stretch.span_s() {
         let span_s = stretch.span_s();
         found.push(FitVerdict::TimeConstantLong { time_constant_s: slowest, span_s });
-    } else if gain.is_nan() || gain > GAIN_KNOWN_PERCENT {
-        let percent = if gain.is_nan() { f64::INFINITY } else { gain };
-        found.push(FitVerdict::GainUncertain { percent, mv_move: moved * percent / 10.0, mv_moved: moved });
+    } else if gain.is_nan() || gain >= 100.0 {
+        found.push(FitVerdict::GainUnknown);
+    } else if gain > GAIN_KNOWN_PERCENT {
+        found.push(FitVerdict::GainUncertain {
+            percent: gain,
+            mv_move: moved * gain / 10.0,
+            mv_moved: moved,
+        });
     }
     let sample_time_s = stretch.sample_time_s;
     if fit.structure != super::Structure::Ipdt && slowest < sample_time_s / 3.0 {
@@ -89,6 +95,14 @@ fn parameters(fit: &ModelFit, stretch: &Stretch, found: &mut Vec<FitVerdict>) {
             found.push(FitVerdict::DeadTimeUnknown { upper_s: upper, mv_move: moved * times });
         }
     }
+}
+
+/// Whether the model's answer to the MV vanishes in the PV's movement: then rounding alone gave it a gain.
+fn moves_nothing(fit: &ModelFit, stretch: &Stretch, moved: f64) -> bool {
+    const SHARE: f64 = 1e-6;
+    let (low, high) = range(stretch.y.iter());
+    let integrating_s = if fit.structure == super::Structure::Ipdt { stretch.span_s() } else { 1.0 };
+    fit.parameters[0].value.abs() * moved * integrating_s < SHARE * (high - low)
 }
 
 /// From the lowest to the highest MV, in MV units.

@@ -20,6 +20,9 @@ impl Structure {
     /// All of them, simplest first.
     pub const ALL: [Self; 4] = [Self::Ipdt, Self::Fopdt, Self::Sopdt, Self::SopdtZero];
 
+    /// All of them, each after those whose dynamics start its search.
+    pub const CHOICE: [Self; 4] = [Self::Fopdt, Self::Ipdt, Self::Sopdt, Self::SopdtZero];
+
     /// As files and the command line name it.
     #[must_use]
     pub fn key(self) -> &'static str {

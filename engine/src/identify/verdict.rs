@@ -47,6 +47,8 @@ pub enum FitVerdict {
         /// Largest move there was, in MV units.
         mv_moved: f64,
     },
+    /// The PV does not answer the MV beyond doubt: not even a sign is told.
+    GainUnknown,
     /// A time constant, damping or zero that the noise hides.
     ParameterUncertain {
         /// `T`, `T2`, `zeta` or `Tz`.
@@ -144,37 +146,15 @@ impl std::fmt::Display for FitVerdict {
                 "the fit is poor ({} %): the MV explains little of this PV's movement, or the structure is the wrong one",
                 n(*fit_percent)
             ),
-            Self::GainUncertain { percent, mv_move, mv_moved } => write!(
+            Self::GainUnknown => write!(
                 f,
-                "the move was too small for this noise: the gain is known only to ±{} %; a move of the MV by {} instead of {} would give ±10 %",
-                n(*percent),
-                n(*mv_move),
-                n(*mv_moved)
+                "the PV does not answer the MV beyond doubt here: not even the sign of the gain can be told; move the MV further, or choose a stretch in which it moves"
             ),
-            Self::ParameterUncertain { name, percent, mv_move } => write!(
-                f,
-                "{name} is known only to ±{} %: a move of the MV by {} would give ±20 %",
-                n(*percent),
-                n(*mv_move)
-            ),
-            Self::DeadTimeUnknown { upper_s, mv_move } => write!(
-                f,
-                "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
-                n(*upper_s),
-                n(*mv_move)
-            ),
-            Self::TimeConstantLong { time_constant_s, span_s } => write!(
-                f,
-                "T = {} s is longer than the stretch ({} s): only the ratio K/T is known, record longer",
-                n(*time_constant_s),
-                n(*span_s)
-            ),
-            Self::TimeConstantShort { time_constant_s, sample_time_s } => write!(
-                f,
-                "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
-                n(*time_constant_s),
-                n(*sample_time_s)
-            ),
+            Self::GainUncertain { .. }
+            | Self::ParameterUncertain { .. }
+            | Self::DeadTimeUnknown { .. }
+            | Self::TimeConstantLong { .. }
+            | Self::TimeConstantShort { .. } => self.write_parameter(f),
             Self::ResolutionLimited { resolution, levels } => write!(
                 f,
                 "resolution, not noise, limits the gain: the PV moves in steps of {} and the whole movement is {} of them; the intervals are too optimistic",
@@ -216,6 +196,7 @@ impl Explain for FitVerdict {
             Self::DisturbanceUnknown { .. } => "verdict.disturbance_unknown",
             Self::Poor { .. } => "verdict.poor",
             Self::GainUncertain { .. } => "verdict.gain_uncertain",
+            Self::GainUnknown => "verdict.gain_unknown",
             Self::ParameterUncertain { .. } => "verdict.parameter_uncertain",
             Self::DeadTimeUnknown { .. } => "verdict.dead_time_unknown",
             Self::TimeConstantLong { .. } => "verdict.time_constant_long",
@@ -248,6 +229,7 @@ impl Explain for FitVerdict {
             Self::GainUncertain { percent, mv_move, mv_moved } => {
                 vec![n("percent", percent), n("mv_move", mv_move), n("mv_moved", mv_moved)]
             }
+            Self::GainUnknown => vec![],
             Self::ParameterUncertain { name, percent, mv_move } => {
                 vec![("name", (*name).to_owned()), n("percent", percent), n("mv_move", mv_move)]
             }
@@ -277,6 +259,45 @@ impl Explain for FitVerdict {
 }
 
 impl FitVerdict {
+    /// What is said of a single parameter; nothing for the others.
+    fn write_parameter(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::GainUncertain { percent, mv_move, mv_moved } => write!(
+                f,
+                "the move was too small for this noise: the gain is known only to ±{} %; a move of the MV by {} instead of {} would give ±10 %",
+                n(*percent),
+                n(*mv_move),
+                n(*mv_moved)
+            ),
+            Self::ParameterUncertain { name, percent, mv_move } => write!(
+                f,
+                "{name} is known only to ±{} %: a move of the MV by {} would give ±20 %",
+                n(*percent),
+                n(*mv_move)
+            ),
+            Self::DeadTimeUnknown { upper_s, mv_move } => write!(
+                f,
+                "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
+                n(*upper_s),
+                n(*mv_move)
+            ),
+            Self::TimeConstantLong { time_constant_s, span_s } => write!(
+                f,
+                "T = {} s is longer than the stretch ({} s): only the ratio K/T is known, record longer",
+                n(*time_constant_s),
+                n(*span_s)
+            ),
+            Self::TimeConstantShort { time_constant_s, sample_time_s } => write!(
+                f,
+                "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
+                n(*time_constant_s),
+                n(*sample_time_s)
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether it speaks against using the model.
     #[must_use]
     pub fn is_objection(&self) -> bool {
@@ -289,7 +310,13 @@ impl FitVerdict {
     /// Whether it says that the stretch cannot tell a model at all.
     #[must_use]
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::NoExcitation { .. } | Self::Disturbed { .. })
+        /// Fit in percent below which nothing of the PV is explained.
+        const NOTHING_PERCENT: f64 = 20.0;
+        match self {
+            Self::NoExcitation { .. } | Self::Disturbed { .. } | Self::GainUnknown => true,
+            Self::Poor { fit_percent } => *fit_percent < NOTHING_PERCENT,
+            _ => false,
+        }
     }
 
     /// One value of every variant, for the test that compares sentences and translations.
@@ -302,6 +329,7 @@ impl FitVerdict {
             Self::DisturbanceUnknown { name: "feed".to_owned() },
             Self::Poor { fit_percent: 12.0 },
             Self::GainUncertain { percent: 40.0, mv_move: 4.0, mv_moved: 1.0 },
+            Self::GainUnknown,
             Self::ParameterUncertain { name: "T2", percent: 80.0, mv_move: 4.0 },
             Self::DeadTimeUnknown { upper_s: 3.5, mv_move: 2.0 },
             Self::TimeConstantLong { time_constant_s: 900.0, span_s: 300.0 },

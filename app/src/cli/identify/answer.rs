@@ -86,7 +86,8 @@ fn add_parameters(to: &mut Map<String, Value>, parameters: &[Parameter]) {
     to.insert("interval_95".into(), Value::Object(intervals));
 }
 
-fn model(fit: &ModelFit) -> Value {
+/// A fit under the names of the specs.
+pub(super) fn model(fit: &ModelFit) -> Value {
     let mut out = Map::new();
     out.insert("structure".into(), json!(fit.structure.key()));
     add_parameters(&mut out, &fit.parameters);
@@ -170,6 +171,16 @@ fn title(structure: Structure) -> &'static str {
     }
 }
 
+fn parameter_row(p: &Parameter) -> Vec<String> {
+    vec![label(p.name), shown(Some(p.value)), between(p.interval_95)]
+}
+
+/// Structure, then a parameter a row with its interval.
+pub(super) fn parameter_rows(fit: &ModelFit) -> Vec<Vec<String>> {
+    let head = vec![title(fit.structure).to_owned(), String::new(), "95 % interval".to_owned()];
+    std::iter::once(head).chain(fit.parameters.iter().map(parameter_row)).collect()
+}
+
 fn text(chosen: &Chosen, study: &LoopStudy) -> String {
     let mut out = String::new();
     if let Ok(choice) = &study.choice {
@@ -180,7 +191,7 @@ fn text(chosen: &Chosen, study: &LoopStudy) -> String {
         rows.extend(fit.parameters.iter().map(parameter));
         for d in &fit.disturbances {
             rows.push(vec![format!("from {}", d.name)]);
-            rows.extend(d.parameters.iter().map(parameter));
+            rows.extend(d.parameters.iter().map(parameter_row));
         }
         for (name, value) in
             [("bias", fit.bias), ("MV at rest", fit.mv_at_rest), ("fit (%)", Some(fit.fit_percent))]

@@ -5,13 +5,23 @@ mod answer;
 use std::path::{Path, PathBuf};
 
 use vasos_engine::identify::{
-    Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, Structure, StudyOptions,
+    Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModelFit, Structure, StudyOptions,
     reaction_curve, study_loop,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
 use vasos_io::log::{ImportOptions, ImportedLog, import_log};
 
 use super::{Answer, Refusal};
+
+/// A fit as JSON.
+pub(super) fn model_json(fit: &ModelFit) -> serde_json::Value {
+    answer::model(fit)
+}
+
+/// Parameters of a fit as rows of a table.
+pub(super) fn model_rows(fit: &ModelFit) -> Vec<Vec<String>> {
+    answer::parameter_rows(fit)
+}
 
 /// Arguments of `vasos identify`.
 #[derive(Debug, clap::Args)]

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use vasos_engine::document::{Document, FittedRows, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
+use vasos_engine::excitation::{ExcitationReport, identify_report};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, Structure, StudyOptions, study_loop,
+    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, Structure, StudyOptions, study_loop,
 };
 use vasos_engine::signal::{ChannelKind, LogColumn, LogTable};
 
@@ -174,6 +175,29 @@ fn of_run(
         pv_unit: "cm".to_owned(),
         mv_unit: unit.to_owned(),
     })
+}
+
+/// The model that a test's record tells, in the units of its loop; called on a thread of its own.
+#[must_use]
+pub fn of_report(report: &ExcitationReport, mv_unit: String) -> Outcome {
+    let told = match identify_report(report) {
+        Ok(told) => told,
+        Err(error) => return Outcome::Failed(Box::new(error)),
+    };
+    let fit = Arc::new(told.fit().clone());
+    let record = &report.record;
+    let end = |at: Option<&f64>| at.copied().unwrap_or(report.start_s);
+    let stretch = Stretch { from_s: end(record.time_s.first()), to_s: end(record.time_s.last()) };
+    let study = LoopStudy { choice: Ok(told.choice), controller: None, oscillation: None, findings: vec![] };
+    Outcome::Model(Box::new(NewModel {
+        model: fit.model.clone(),
+        origin: ModelOrigin::Run { tag: report.tag.clone(), stretch },
+        fit: Some(fit),
+        study: Some(Arc::new(study)),
+        rows: Some(Arc::new(FittedRows { time_s: record.time_s.clone(), pv: record.pv.clone() })),
+        pv_unit: "cm".to_owned(),
+        mv_unit,
+    }))
 }
 
 /// Name of a structure, or of the choice among all.

@@ -2,14 +2,17 @@
 
 mod data;
 mod evidence;
+mod excite;
 mod models;
 
 use eframe::egui::{self, RichText};
-use vasos_engine::document::{DocumentCommand, ModelOrigin, NewModel, SourceChoice};
+use vasos_engine::document::{DocumentCommand, LogRoles, ModelOrigin, NewModel, SourceChoice};
 use vasos_engine::identify::Structure;
 use vasos_engine::model::{Fopdt, ProcessModel};
+use vasos_engine::signal::LogTable;
 
-pub use data::{FitData, data, structure_name};
+pub use data::{FitData, data, of_report, structure_name};
+pub use excite::Bench;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -21,6 +24,8 @@ pub struct State {
     mv_before: Option<f64>,
     structure: Option<Structure>,
     picture: evidence::Picture,
+    /// Tests of the running loop.
+    pub bench: Bench,
     typed: [f64; 3],
     typing: bool,
 }
@@ -31,6 +36,7 @@ impl Default for State {
             mv_before: None,
             structure: None,
             picture: evidence::Picture::default(),
+            bench: Bench::default(),
             typed: [4.9, 152.0, 2.0],
             typing: false,
         }
@@ -42,6 +48,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let mut actions = vec![];
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         source(ui, view, state, &mut actions);
+        excite::ui(ui, view, &mut state.bench, &mut actions);
         models::table(ui, view, &mut actions);
         if state.typing {
             type_model(ui, view, state, &mut actions);
@@ -61,33 +68,7 @@ fn source(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<A
     let document = view.document;
     let is_log = document.source == SourceChoice::Log;
     if let (true, Some(log)) = (is_log, &document.log) {
-        let mut roles = document.roles;
-        let mut changed = false;
-        let mode = (tr!("identify.mode"), &mut roles.mode);
-        let disturbance = (tr!("identify.disturbance"), &mut roles.disturbance);
-        let named = [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)];
-        let lines = [named.map(|(what, role)| (what.to_owned(), role)).into(), vec![mode, disturbance]];
-        for line in lines {
-            ui.horizontal_wrapped(|ui| {
-                ui.spacing_mut().item_spacing.x = 3.0;
-                let width = (ui.available_width() - 142.0) / 3.0;
-                for (what, role) in line {
-                    changed |= column_choice(ui, &what, role, log, width);
-                }
-            });
-        }
-        if changed {
-            actions.push(Action::Document(DocumentCommand::Roles(roles)));
-        }
-        ui.horizontal(|ui| {
-            let mut known = state.mv_before.is_some();
-            ui.checkbox(&mut known, tr!("identify.mv_before")).on_hover_text(tr!("identify.mv_before_hint"));
-            let mut value = state.mv_before.unwrap_or(0.0);
-            if known {
-                ui.add(egui::DragValue::new(&mut value).speed(0.1));
-            }
-            state.mv_before = known.then_some(value);
-        });
+        columns(ui, log, document.roles, state, actions);
     }
     ui.horizontal_wrapped(|ui| {
         let p = theme::palette(ui);
@@ -104,6 +85,44 @@ fn source(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<A
         );
         ui.label(RichText::new(stretch).color(p.weak));
     });
+}
+
+/// Which column of the log is what; what a log seldom needs is folded away.
+fn columns(
+    ui: &mut egui::Ui,
+    log: &LogTable,
+    before: LogRoles,
+    state: &mut State,
+    actions: &mut Vec<Action>,
+) {
+    let mut roles = before;
+    let choices = |ui: &mut egui::Ui, line: Vec<(String, &mut Option<usize>)>| {
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            let width = (ui.available_width() - 142.0) / 3.0;
+            for (what, role) in line {
+                column_choice(ui, &what, role, log, width);
+            }
+        });
+    };
+    let named = [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)];
+    choices(ui, named.map(|(what, role)| (what.to_owned(), role)).into());
+    egui::CollapsingHeader::new(tr!("identify.more_columns")).id_salt("more columns").show(ui, |ui| {
+        let mode = (tr!("identify.mode"), &mut roles.mode);
+        choices(ui, vec![mode, (tr!("identify.disturbance"), &mut roles.disturbance)]);
+        ui.horizontal(|ui| {
+            let mut known = state.mv_before.is_some();
+            ui.checkbox(&mut known, tr!("identify.mv_before")).on_hover_text(tr!("identify.mv_before_hint"));
+            let mut value = state.mv_before.unwrap_or(0.0);
+            if known {
+                ui.add(egui::DragValue::new(&mut value).speed(0.1));
+            }
+            state.mv_before = known.then_some(value);
+        });
+    });
+    if roles != before {
+        actions.push(Action::Document(DocumentCommand::Roles(roles)));
+    }
 }
 
 /// Which structure the next fit has.

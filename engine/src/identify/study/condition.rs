@@ -73,8 +73,11 @@ pub(super) fn slips(values: &[f64]) -> Vec<usize> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let (low, high) = (sorted[sorted.len() * 5 / 100], sorted[sorted.len() * 95 / 100]);
-    // A column that rests but for one move is no measure of what is far.
-    let range = (high - low).max(0.02 * low.abs().max(high.abs()));
+    // A column that rests but for one move is no measure of what is far, unless that is several times its value.
+    let range = (high - low).max(1.5 * low.abs().max(high.abs()) * f64::from(u8::from(high == low)));
+    if range <= 0.0 {
+        return vec![];
+    }
     (1..values.len() - 1)
         .filter(|&k| {
             let (before, now, after) = (values[k - 1], values[k], values[k + 1]);
@@ -290,6 +293,9 @@ mod tests {
         let (t, pv, mut mv) = noisy(900);
         mv[500] = 70.0;
         assert!(condition(&t, &pv, &mv, 1).findings.is_empty());
+        // A pulse of one row is all that some records have.
+        let pulse: Vec<f64> = (0..900).map(|k| if k == 300 { 1.0 } else { 0.0 }).collect();
+        assert!(slips(&pulse).is_empty());
     }
 
     #[test]

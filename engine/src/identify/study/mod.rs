@@ -16,9 +16,7 @@ pub use controller::ControllerFit;
 pub use finding::RecordFinding;
 pub use stiction::Oscillation;
 
-use super::{
-    Choice, FitError, FitOptions, FitProblem, FitVerdict, InitialState, Structure, choose_model, fit_model,
-};
+use super::{Choice, FitError, FitProblem, FitVerdict, Structure, choose_among, choose_from_rest};
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
 use condition::{condition, mended, slips};
@@ -109,23 +107,15 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
         }
     }
     let controller = controller_of(&record, &problem, &saturated, &mut findings);
-    let mut choice = fitted(&problem, options);
-    if starts_at_rest(&problem) {
-        let at_rest = FitOptions { initial_state: InitialState::Rest, ..problem.options.clone() };
-        let rest = fitted(&FitProblem { options: at_rest.clone(), ..problem.clone() }, options);
-        if let (Ok(free), Ok(found)) = (&choice, &rest)
-            && found.chosen().fit_percent > free.chosen().fit_percent - RESTING_PERCENT
-        {
-            problem.options = at_rest;
-            choice = rest;
-        }
-    }
+    let structures = options.structure.map_or(Structure::CHOICE.to_vec(), |structure| vec![structure]);
+    let (mut choice, initial_state) = choose_from_rest(&problem, &structures);
+    problem.options.initial_state = initial_state;
     if let Ok(choice) = &mut choice {
         refuse_feedback(&record, &problem, controller.as_ref(), choice);
     }
     let earlier = one_row_earlier(problem.mv);
     if !options.as_is
-        && let Some(better) = answered_in_the_same_row(&problem, &earlier, &choice, options)
+        && let Some(better) = answered_in_the_same_row(&problem, &earlier, &choice, &structures)
     {
         choice = Ok(better);
         findings.push(RecordFinding::MvEarlier);
@@ -135,48 +125,6 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     }
     let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
     Ok(LoopStudy { choice, controller, oscillation, findings })
-}
-
-fn fitted(problem: &FitProblem, options: &StudyOptions) -> Result<Choice, FitError> {
-    match options.structure {
-        None => choose_model(problem),
-        Some(structure) => fit_model(problem, structure).map(Choice::of_one),
-    }
-}
-
-/// What a start at rest may cost in fit, in points, where the rows ahead of the first move stand still.
-const RESTING_PERCENT: f64 = 10.0;
-
-/// Whether the PV stands still in the rows ahead of the first move of the MV.
-///
-/// With a free start least squares may explain a response that begins soon after the first row as the end of an
-/// earlier motion, and does so with a better fit where the process is a little non-linear. The rows ahead of the move
-/// speak against it.
-fn starts_at_rest(problem: &FitProblem) -> bool {
-    const ROWS: usize = 5;
-    /// Part of the whole movement that counts as standing still.
-    const STILL: f64 = 0.01;
-    let Some(rest) = problem.mv.windows(2).position(|w| w[0] != w[1]).map(|k| k + 1) else { return false };
-    if rest < ROWS
-        || problem.options.initial_state == InitialState::Rest
-        || problem.options.mv_before.is_some()
-    {
-        return false;
-    }
-    let rows = &problem.pv[..rest];
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let range = |values: &[f64]| {
-        let (low, high) =
-            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        high - low
-    };
-    // Ends averaged over a third, against what the scatter of that many rows leaves of a trend.
-    let third = (rest / 3).max(1);
-    let (first, last) = (&rows[..third], &rows[rest - third..]);
-    let middle = mean(rows);
-    let scatter = (rows.iter().map(|y| (y - middle).powi(2)).sum::<f64>() / rest as f64).sqrt();
-    let change = (mean(last) - mean(first)).abs();
-    change <= STILL * range(problem.pv) + 2.0 * scatter * (2.0 / third as f64).sqrt()
 }
 
 fn one_row_earlier(mv: &[f64]) -> Vec<f64> {
@@ -189,7 +137,7 @@ fn answered_in_the_same_row(
     problem: &FitProblem,
     earlier: &[f64],
     choice: &Result<Choice, FitError>,
-    options: &StudyOptions,
+    structures: &[Structure],
 ) -> Option<Choice> {
     /// Correlation of the residuals with the moves of their own row, in half widths of its band.
     const BANDS: f64 = 3.0;
@@ -205,7 +153,7 @@ fn answered_in_the_same_row(
         return None;
     }
     let shifted = FitProblem { mv: earlier, ..problem.clone() };
-    let other = fitted(&shifted, options).ok()?;
+    let other = choose_among(&shifted, structures).ok()?;
     (other.chosen().mse < FALL * fit.mse && other.chosen().is_usable()).then_some(other)
 }
 
