@@ -228,3 +228,21 @@ fn a_bump_after_a_short_rest_is_not_taken_for_an_earlier_motion() {
     let settled = (pv[2999] - pv[0]) / 20.0;
     assert!((gain / settled - 1.0).abs() < 0.08, "K {gain} for {settled}");
 }
+
+/// A step soon after the first row, nearly without noise: between moves a first order obeys the law of a PI with Ti = T, and
+/// the one move was taken for its answer. The golden step of the rig was refused as feedback alone.
+#[test]
+fn a_step_by_hand_is_no_controller() {
+    let text = include_str!("../../assets/golden/rig_step_tq2_coupled.csv");
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|field| field.parse().expect("a number")).collect())
+        .collect();
+    let column = |c: usize| -> Vec<f64> { rows.iter().map(|row| row[c]).collect() };
+    let (time_s, pv, mv) = (column(0), column(3), column(1));
+    let record = LoopRecord { problem: FitProblem::new(&time_s, &pv, &mv), sp: None, mode: None };
+    let found = study_loop(&record, &StudyOptions::default()).expect("a study");
+    assert!(found.controller.is_none(), "{:?}", found.controller);
+    assert!(found.has_model());
+}

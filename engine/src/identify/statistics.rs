@@ -75,11 +75,10 @@ pub(super) fn is_even(time_s: &[f64], step_s: f64, tolerance_s: f64) -> bool {
 
 /// Step of a quantised signal: the mean of the smallest moves, when all moves are multiples of it and there are few
 /// levels. A converter behind a coarse sensor shifts each level by up to half a code, so that multiples are rough.
-pub(super) fn resolution(values: &[f64]) -> Option<f64> {
+/// `rough` is how far a move may lie from a multiple, in steps.
+pub(super) fn resolution(values: &[f64], rough: f64) -> Option<f64> {
     /// Rows looked at.
     const ROWS: usize = 20_000;
-    /// How far a move may lie from a multiple, in steps.
-    const ROUGH: f64 = 0.1;
     let moves = || values.windows(2).take(ROWS).map(|w| (w[1] - w[0]).abs());
     let largest = values.iter().take(ROWS).fold(0.0_f64, |m, v| m.max(v.abs()));
     let smallest = moves().filter(|&m| m > 1e-9 * largest).fold(f64::INFINITY, f64::min);
@@ -90,7 +89,7 @@ pub(super) fn resolution(values: &[f64]) -> Option<f64> {
     let step = single().sum::<f64>() / single().count() as f64;
     let whole = |m: f64| {
         let levels = m / step;
-        (levels - levels.round()).abs() < ROUGH && levels < 1000.0
+        (levels - levels.round()).abs() < rough && levels < 1000.0
     };
     let (mut still, mut total) = (0, 0);
     for m in moves() {
@@ -114,9 +113,9 @@ mod tests {
         let read = |y: f64| (((y / 0.35).round() * 0.35) / code).round() * code;
         let values: Vec<f64> =
             (0..2000).map(|k| read(3.0 + 4.0 * (0.37 * f64::from(k) / 20.0).sin())).collect();
-        let step = resolution(&values).expect("a step");
+        let step = resolution(&values, 0.1).expect("a step");
         assert!((step - 0.35).abs() < 0.005, "{step}");
         let smooth: Vec<f64> = (0..2000).map(|k| (0.1 * f64::from(k)).sin()).collect();
-        assert_eq!(resolution(&smooth), None);
+        assert_eq!(resolution(&smooth, 0.1), None);
     }
 }

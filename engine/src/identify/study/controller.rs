@@ -61,13 +61,19 @@ pub(super) struct Columns<'a> {
 /// Regresses the moves of the MV on those of the error: Δu = Kc (b Δr − Δy) + Kc/Ti ∫e dt − Kc Td Δ²y/h.
 ///
 /// Tries moves over 1 to 8 rows, an answer in the same row and in the next, and b = 0 and 1; takes what explains the
-/// moves best. `None` below 20 moves, where nothing explains a third of them, or where not even the sign of Kc is told:
-/// then a hand moves the MV.
+/// moves best. `None` below 20 spans, where the MV moves in fewer than ten rows, where nothing explains a third of the
+/// moves, or where not even the sign of Kc is told: then a hand moves the MV.
 pub(super) fn fit_controller(columns: &Columns) -> Option<ControllerFit> {
     const EXPLAINED: f64 = 0.33;
     const STRIDES: [usize; 4] = [1, 2, 4, 8];
     /// A longer stride must explain this much more of its moves.
     const WORTH: f64 = 0.02;
+    /// A controller answers row after row. While the MV stands still a first order obeys the law of a PI with Ti = T, so
+    /// that a step by hand soon after the first row would pass for its doing.
+    const ROWS_MOVED: usize = 10;
+    if columns.mv.windows(2).filter(|w| w[0] != w[1]).count() < ROWS_MOVED {
+        return None;
+    }
     let moving = columns.sp.is_some_and(|sp| sp.iter().any(|v| *v != sp[0]));
     let mut best: Option<ControllerFit> = None;
     for stride in STRIDES {
