@@ -163,7 +163,7 @@ fn sensitivities_are_those_of_differences() {
         }
         let (_, slopes) = simulate_rig(&problem, &at).expect("a simulation");
         for i in 0..at.len() {
-            let step = 1e-5 * at[i].abs().max(1.0);
+            let step = 1e-4 * at[i].abs().max(1.0);
             let moved = |by: f64| {
                 let mut at = at.clone();
                 at[i] += by;
@@ -221,4 +221,98 @@ fn a_record_without_noise_gives_back_what_made_it() {
         assert!((found / truth - 1.0).abs() < 1e-5, "{name}: {found}, not {truth}");
     }
     assert!(matches!(fit.verdicts[0], GreyBoxVerdict::Good { .. }), "{:?}", fit.verdicts);
+}
+
+/// Adds white noise to every output.
+fn noisy(mut record: GreyBoxRecord, sigma: f64, seed: u64) -> GreyBoxRecord {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    for value in record.outputs.iter_mut().flat_map(|o| &mut o.values) {
+        // Twelve uniform numbers add up to a normal one with variance 1.
+        let sum: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
+        *value += sigma * (sum - 6.0);
+    }
+    record
+}
+
+#[test]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    let network = preset("stad").expect("a preset");
+    let free = [("FV01.k90", [50.0, 300.0]), ("FV03.k90", [20.0, 150.0]), ("BA01.scale", [0.5, 2.0]), ("BA01.delay_s", [0.0, 5.0])];
+    let truth = [131.0, 60.0, 1.04, 1.71];
+    let real = changed(&network, 1, &free, &truth);
+    let exact = only(recorded(&real, 1, 1500, 120, 4), &[2]);
+    const SEEDS: u64 = 60;
+    let (mut inside, mut rmse) = (0, 0.0);
+    for seed in 0..SEEDS {
+        let fit = fit_rig(&problem(&network, 1, noisy(exact.clone(), 0.05, seed), &free)).expect("a fit");
+        let holds = |(p, t): (&vasos_engine::identify::grey_box::RigParameter, f64)| {
+            (p.interval_95[0]..=p.interval_95[1]).contains(&t)
+        };
+        inside += fit.parameters.iter().zip(truth).filter(|(p, t)| holds((p, *t))).count();
+        rmse += fit.train.rmse / SEEDS as f64;
+    }
+    let share = inside as f64 / (SEEDS as f64 * free.len() as f64);
+    println!("{share} of the intervals hold the truth; rmse {rmse}");
+    assert!((0.90..=0.99).contains(&share), "{share}");
+    assert!((rmse / 0.05 - 1.0).abs() < 0.02, "{rmse}");
+}
+
+#[test]
+fn missing_outputs_are_passed_over() {
+    let network = preset("stad").expect("a preset");
+    let free = [("FV03.k90", [20.0, 150.0]), ("BA01.scale", [0.5, 2.0])];
+    let mut record = only(recorded(&network, 1, 1500, 120, 4), &[2]);
+    record.outputs[0].values.iter_mut().step_by(3).for_each(|v| *v = f64::NAN);
+    record.inputs[0].values[700..705].fill(f64::NAN);
+    let fit = fit_rig(&problem(&network, 1, record, &free)).expect("a fit");
+    assert!((value(&fit, "FV03.k90") / 63.6 - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn what_a_record_cannot_tell_is_said() {
+    let network = preset("stad").expect("a preset");
+    let exact = only(recorded(&network, 1, 1500, 120, 4), &[2]);
+    let verdicts = |free: &[(&str, [f64; 2])]| {
+        fit_rig(&problem(&network, 1, noisy(exact.clone(), 0.05, 1), free)).expect("a fit").verdicts
+    };
+    // FV02 is shut in this configuration.
+    let shut = verdicts(&[("FV02.k90", [20.0, 150.0]), ("FV03.k90", [20.0, 150.0])]);
+    assert!(shut.contains(&GreyBoxVerdict::NoEffect { name: "FV02.k90".to_owned() }), "{shut:?}");
+    // All flows and all areas by one factor give the same levels.
+    let scaled = verdicts(&[
+        ("FV01.k90", [50.0, 300.0]),
+        ("FV03.k90", [20.0, 150.0]),
+        ("BA01.scale", [0.5, 2.0]),
+        ("TQ1.area_cm2", [50.0, 400.0]),
+        ("TQ3.area_cm2", [50.0, 400.0]),
+    ]);
+    let said = |v: &GreyBoxVerdict| matches!(v, GreyBoxVerdict::MakeUp { names } if names.contains("TQ3.area_cm2"));
+    assert!(scaled.iter().any(said), "{scaled:?}");
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let network = preset("stad").expect("a preset");
+    let wrong = |name: &str, bounds: [f64; 2]| {
+        FreeParameter::new(&network, 0, name, bounds).expect_err("not possible").to_string()
+    };
+    assert!(wrong("FV01.q", [0.0, 1.0]).contains("FV01.k90"));
+    assert!(wrong("FV01.k90", [2.0, 1.0]).contains("must lie below"));
+    assert!(wrong("FV01.k90", [1.0, 2.0]).contains("outside its bounds"));
+    assert!(wrong("FV01.k90", [-1.0, 200.0]).contains("not possible"));
+    let record = only(recorded(&network, 1, 200, 120, 4), &[2]);
+    let said = |p: &GreyBoxProblem| fit_rig(p).expect_err("not possible").to_string();
+    let free = [("FV03.k90", [20.0, 150.0])];
+    assert!(said(&problem(&network, 1, record.clone(), &[])).contains("[fit]"));
+    let mut still = record.clone();
+    still.outputs[0].values.fill(3.0);
+    assert!(said(&problem(&network, 1, still, &free)).contains("does not move"));
+    let mut no_input = record.clone();
+    no_input.inputs.clear();
+    assert!(said(&problem(&network, 1, no_input, &free)).contains("u=COLUMN"));
+    let mut short = record;
+    short.time_s.truncate(8);
+    short.inputs[0].values.truncate(8);
+    short.outputs[0].values.truncate(8);
+    assert!(said(&problem(&network, 1, short, &free)).contains("needs at least"));
 }

@@ -153,7 +153,7 @@ pub fn fit_rig(problem: &GreyBoxProblem) -> Result<GreyBoxFit, GreyBoxError> {
         initial_levels(&structure, &record, &weights, &bounds, INITIAL_SAMPLES, &mut unknowns);
         judged(problem, &structure, &record, &unknowns)
     });
-    let verdicts = judge::verdicts(&parameters, &knowledge, &shown, other.as_ref(), &tests);
+    let verdicts = judge::verdicts(&problem.free, &parameters, &knowledge, &shown, other.as_ref(), &tests);
     let initial_samples = INITIAL_SAMPLES.min(train.rows());
     Ok(GreyBoxFit { parameters, train: shown, validate: other, initial_samples, tests, verdicts, runs })
 }

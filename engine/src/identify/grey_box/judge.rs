@@ -3,6 +3,7 @@
 use super::super::residual_tests::ResidualTests;
 use super::GreyBoxVerdict;
 use super::fit::{Knowledge, RecordFit, RigParameter};
+use super::problem::FreeParameter;
 
 /// Fit in percent below which a rig does not follow the record.
 const POOR: f64 = 50.0;
@@ -17,6 +18,7 @@ const TELLS: f64 = 0.9;
 
 /// Findings, the gravest first; at least one.
 pub(super) fn verdicts(
+    free: &[FreeParameter],
     parameters: &[RigParameter],
     knowledge: &Knowledge,
     train: &RecordFit,
@@ -43,7 +45,7 @@ pub(super) fn verdicts(
         let [low, high] = p.bounds;
         if !told && p.interval_95[1] - p.interval_95[0] > TELLS * (high - low) {
             found.push(unknown(parameters, &p.name));
-        } else if !told && let Some(bound) = p.bounds.into_iter().find(|b| *b == p.value) {
+        } else if !told && let Some(bound) = p.bounds.into_iter().find(|b| *b == p.value && !natural(&free[i], *b)) {
             found.push(GreyBoxVerdict::AtBound { name: p.name.clone(), bound });
         }
     }
@@ -60,6 +62,11 @@ pub(super) fn verdicts(
         found.push(GreyBoxVerdict::Good { fit_percent });
     }
     found
+}
+
+/// Whether nothing lies beyond a bound: no valve has a negative k.
+fn natural(free: &FreeParameter, bound: f64) -> bool {
+    free.target.possible().contains(&bound)
 }
 
 fn unknown(parameters: &[RigParameter], name: &str) -> GreyBoxVerdict {
