@@ -25,13 +25,12 @@ pub fn fitted_rig(name: &str, text: &str, fitted: &RigSpec) -> Result<FittedRig,
     let own: RigSpec = parse(name, text)?;
     let (mut fitted, mut no_longer_steady) = (fitted.clone(), Vec::new());
     loop {
-        let edited = edited(text, &own, &fitted).filter(|t| parse::<RigSpec>(name, t).is_ok_and(|s| s == fitted));
+        let edited =
+            edited(text, &own, &fitted).filter(|t| parse::<RigSpec>(name, t).is_ok_and(|s| s == fitted));
         let text = match edited {
             Some(text) => text,
-            None => toml_edit::ser::to_string_pretty(&fitted).map_err(|error| FileError::Write {
-                path: name.to_owned(),
-                reason: error.to_string(),
-            })?,
+            None => toml_edit::ser::to_string_pretty(&fitted)
+                .map_err(|error| FileError::Write { path: name.to_owned(), reason: error.to_string() })?,
         };
         match parse_rig(name, &text) {
             Ok(_) => return Ok(FittedRig { text, no_longer_steady }),

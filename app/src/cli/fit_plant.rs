@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 use vasos_engine::identify::grey_box::{
-    FreeParameter, GreyBoxFit, GreyBoxProblem, GreyBoxRecord, RecordFit, RecordedInput, RecordedOutput, fit_rig,
-    input_named, output_named,
+    FreeParameter, GreyBoxFit, GreyBoxProblem, GreyBoxRecord, RecordFit, RecordedInput, RecordedOutput,
+    fit_rig, input_named, output_named,
 };
 use vasos_engine::plant::Network;
 use vasos_engine::signal::derived_column;
@@ -104,7 +104,8 @@ fn free(network: &Network, configuration: usize, given: &[String]) -> Result<Vec
             let (low, high) = bounds.split_once("..")?;
             Some((name, [low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?]))
         });
-        let wrong = || Refusal(format!("--fit '{text}': write TAG.field=LOW..HIGH, for example FV01.k90=5..20"));
+        let wrong =
+            || Refusal(format!("--fit '{text}': write TAG.field=LOW..HIGH, for example FV01.k90=5..20"));
         let (name, bounds) = parts.ok_or_else(wrong)?;
         free.push(FreeParameter::new(network, configuration, name, bounds).map_err(Refusal::of)?);
     }
@@ -124,14 +125,12 @@ fn record(arguments: &Arguments, network: &Network, path: &Path) -> Result<GreyB
     let bytes = std::fs::read(path)
         .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
     let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let options =
-        ImportOptions { sample_time_s: arguments.sample_time, time_column: arguments.time.clone() };
+    let options = ImportOptions { sample_time_s: arguments.sample_time, time_column: arguments.time.clone() };
     let log = import_log(&name, &bytes, &options)
         .map_err(|error| Refusal(format!("{}: {error}", path.display())))?;
     let column = |text: &str, option: &str| -> Result<(String, Vec<f64>), Refusal> {
-        let (name, column) = text
-            .split_once('=')
-            .ok_or_else(|| Refusal(format!("--{option} '{text}': write NAME=COLUMN")))?;
+        let (name, column) =
+            text.split_once('=').ok_or_else(|| Refusal(format!("--{option} '{text}': write NAME=COLUMN")))?;
         let values = derived_column(&log.table, column.trim())
             .map_err(|error| Refusal(format!("{}: {error}", path.display())))?;
         Ok((name.trim().to_owned(), values))
@@ -162,7 +161,9 @@ fn write(
     std::fs::write(path, made.text)
         .map_err(|error| Refusal(format!("{} cannot be written: {error}", path.display())))?;
     let remark = |id: &String| {
-        format!("the fitted rig cannot hold the setpoints of '{id}': in the new file it does not start at rest")
+        format!(
+            "the fitted rig cannot hold the setpoints of '{id}': in the new file it does not start at rest"
+        )
     };
     Ok(made.no_longer_steady.iter().map(remark).collect())
 }
@@ -217,7 +218,8 @@ fn words(problem: &GreyBoxProblem, fit: &GreyBoxFit) -> String {
     }
     text.push_str(&table(&lines));
     text.push('\n');
-    let mut lines = vec![["level", "RMSE", "fit (%)", "RMSE elsewhere", "fit (%)"].map(str::to_owned).to_vec()];
+    let mut lines =
+        vec![["level", "RMSE", "fit (%)", "RMSE elsewhere", "fit (%)"].map(str::to_owned).to_vec()];
     for (i, o) in fit.train.outputs.iter().enumerate() {
         let other = fit.validate.as_ref().and_then(|v| v.outputs.get(i));
         lines.push(vec![

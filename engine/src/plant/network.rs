@@ -260,12 +260,7 @@ fn tanks(spec: &RigSpec) -> Result<Vec<Tank>, RigError> {
                 return Err(RigError::Loop { item: t.id.clone(), tank: t.id.clone() });
             }
             demand(&t.id, "spill_share", t.spill_share, (0.0..=1.0).contains(&t.spill_share), "0…1")?;
-            Ok(Tank {
-                area_cm2: t.area_cm2,
-                height_cm: t.height_cm,
-                spills_to,
-                spill_share: t.spill_share,
-            })
+            Ok(Tank { area_cm2: t.area_cm2, height_cm: t.height_cm, spills_to, spill_share: t.spill_share })
         })
         .collect()
 }

@@ -225,7 +225,10 @@ mod tests {
                 tank: "TQ2".to_owned(),
                 noise_cm: 0.03,
                 range_cm: Some([1.5, 25.5]),
-                resolution_cm: 0.35, gain: 1.0, offset_cm: 0.0 },
+                resolution_cm: 0.35,
+                gain: 1.0,
+                offset_cm: 0.0,
+            },
             ConverterSpec {
                 adc_bits: 12,
                 adc_full_scale_v: 10.0,

@@ -18,6 +18,8 @@ pub const INITIAL_SAMPLES: usize = 50;
 const WEIGHT_ROUNDS: usize = 3;
 /// Least noise of an output, as a share of its movement: records without noise have weights all the same.
 const LEAST_NOISE: f64 = 1e-6;
+/// Most that was in the air before the first row, by the highest flow of the pump as it stands in the file.
+const MOST_IN_AIR: f64 = 3.0;
 /// Share of the movement left over above which other starts are tried.
 const BADLY: f64 = 0.1;
 /// Smallest eigenvalue of the scaled normal equations, as a share of the largest, that still tells something.
@@ -58,6 +60,8 @@ pub struct OutputFit {
 pub struct RecordFit {
     /// Root mean squared error over all outputs.
     pub rmse: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖) over all outputs, each about its own mean.
+    pub fit_percent: f64,
     /// Each output.
     pub outputs: Vec<OutputFit>,
     /// Initial level of every tank the outputs depend on: its tag, and the level.
@@ -102,6 +106,13 @@ pub fn fit_rig(problem: &GreyBoxProblem) -> Result<GreyBoxFit, GreyBoxError> {
         bounds.push([0.0, rim]);
         start.push(problem.network.spec.tanks[vessel.tank].initial_cm.min(rim));
     }
+    for feed in structure.feeds.iter().filter(|f| f.in_air.is_some()) {
+        let (curve, unknowns) = (&structure.pumps[feed.pump], &start);
+        let first = curve.flow(unknowns, train.moves.inputs[feed.pump][0].1).cm3_s;
+        let most = curve.points.iter().map(|p| curve.flow(unknowns, p.0).cm3_s).fold(first, f64::max);
+        bounds.push([0.0, MOST_IN_AIR * most.max(1e-9)]);
+        start.push(first);
+    }
     let spread: Vec<f64> = train.outputs.iter().map(|o| deviation(o)).collect();
     let mut weights: Vec<f64> = spread.iter().map(|s| 1.0 / (s * s)).collect();
     initial_levels(&structure, &train, &weights, &bounds, INITIAL_SAMPLES, &mut start);
@@ -128,7 +139,8 @@ pub fn fit_rig(problem: &GreyBoxProblem) -> Result<GreyBoxFit, GreyBoxError> {
         found = Some(next);
         let noise = left.iter().zip(&spread).map(|(l, s)| l.max(LEAST_NOISE * s));
         let settled: Vec<f64> = noise.map(|n| 1.0 / (n * n)).collect();
-        let moved = settled.iter().zip(&weights).any(|(a, b)| (a / settled[0] / (b / weights[0]) - 1.0).abs() > 0.05);
+        let moved =
+            settled.iter().zip(&weights).any(|(a, b)| (a / settled[0] / (b / weights[0]) - 1.0).abs() > 0.05);
         weights = settled;
         if !moved {
             break;
@@ -159,7 +171,7 @@ pub fn fit_rig(problem: &GreyBoxProblem) -> Result<GreyBoxFit, GreyBoxError> {
 }
 
 /// Simulates the outputs of a problem's record with every free parameter and initial level given: rows by outputs, with
-/// the derivatives of each by the unknowns (parameters, then initial levels) where asked for.
+/// the derivatives of each by the unknowns: parameters, initial levels, then the flow in the air of every pump with a delay.
 ///
 /// # Errors
 /// [`GreyBoxError`] for a problem that cannot be.
@@ -218,8 +230,12 @@ fn judged(problem: &GreyBoxProblem, structure: &Structure, record: &Record, unkn
         }
     });
     let vessels = structure.vessels.iter().zip(&unknowns[structure.parameters..]);
+    let rmse = rmse(&all, &all_simulated);
+    let known = |values: &[f64]| values.iter().filter(|v| v.is_finite()).count() as f64;
+    let movement: f64 = record.outputs.iter().map(|o| deviation(o).powi(2) * known(o)).sum();
     RecordFit {
-        rmse: rmse(&all, &all_simulated),
+        rmse,
+        fit_percent: 100.0 * (1.0 - rmse / (movement / known(&all).max(1.0)).sqrt()),
         outputs: outputs.collect(),
         initial_levels: vessels.map(|(v, &level)| (tanks[v.tank].id.clone(), level)).collect(),
     }
@@ -266,7 +282,8 @@ impl Knowledge {
         let rows: Vec<f64> =
             record.outputs.iter().map(|o| o.iter().filter(|v| v.is_finite()).count() as f64).collect();
         let total: f64 = rows.iter().sum();
-        let per_independent = rows.iter().zip(tests).map(|(r, t)| r * t.rows_per_independent).sum::<f64>() / total;
+        let per_independent =
+            rows.iter().zip(tests).map(|(r, t)| r * t.rows_per_independent).sum::<f64>() / total;
         let freedom = (total / per_independent - n as f64).max(1.0);
         let variance = sums.cost / (total - n as f64).max(1.0) * per_independent;
         let scale: Vec<f64> = (0..n).map(|i| sums.gram[(i, i)].sqrt()).collect();
@@ -316,7 +333,11 @@ impl Knowledge {
                 start: free.start,
                 bounds: free.bounds,
                 standard_error: self.errors[i],
-                interval_95: if half.is_finite() { [cut(value - half), cut(value + half)] } else { free.bounds },
+                interval_95: if half.is_finite() {
+                    [cut(value - half), cut(value + half)]
+                } else {
+                    free.bounds
+                },
             }
         };
         problem.free.iter().enumerate().map(parameter).collect()

@@ -31,6 +31,15 @@ impl Flow {
     }
 }
 
+impl Flow {
+    /// A flow that is an unknown itself.
+    pub fn unknown(unknowns: &[f64], slot: usize) -> Self {
+        let mut flow = Self { cm3_s: unknowns[slot], ..Self::default() };
+        flow.push(&Quantity { value: 0.0, factor: 1.0, slot: Some(slot) }, 1.0);
+        flow
+    }
+}
+
 impl PumpCurve {
     /// `max(0, scale · curve(u) + offset)` with its slopes.
     pub fn flow(&self, unknowns: &[f64], input: f64) -> Flow {
@@ -75,7 +84,8 @@ impl Numbers {
     pub fn new(structure: &Structure, unknowns: &[f64]) -> Self {
         let vessels = &structure.vessels;
         let area: Vec<f64> = vessels.iter().map(|v| v.area.at(unknowns)).collect();
-        let steepness = structure.streams.iter().map(|s| 1.0 / area[s.from] + s.against.map_or(0.0, |a| 1.0 / area[a]));
+        let steepness =
+            structure.streams.iter().map(|s| 1.0 / area[s.from] + s.against.map_or(0.0, |a| 1.0 / area[a]));
         Self {
             k: structure.streams.iter().map(|s| s.k.at(unknowns)).collect(),
             height: vessels.iter().map(|v| v.height.at(unknowns)).collect(),
@@ -239,8 +249,8 @@ fn hand_on(
     }
 }
 
-/// Largest λ·h of a step.
-const RATE: f64 = 0.3;
+/// Largest λ·h of a step: the sensitivity of a fast stream moves while its level rests.
+const RATE: f64 = 0.2;
 /// Largest change of a head within a step, as a share of √(δ² + head²).
 const CURVATURE: f64 = 0.15;
 /// Largest (λ·h)⁴ times the change of a head within a step, in cm.

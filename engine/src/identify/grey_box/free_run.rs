@@ -64,11 +64,14 @@ impl<'a> FreeRun<'a> {
         let width = if sensitive { structure.unknowns() } else { 0 };
         let numbers = Numbers::new(structure, unknowns);
         let zero = vec![0.0; n * (1 + width)];
-        let feeds = structure.feeds.iter().map(|f| structure.pumps[f.pump].flow(unknowns, moves.inputs[f.pump][0].1));
+        let feeds = structure.feeds.iter().map(|f| match f.in_air {
+            Some(slot) => Flow::unknown(unknowns, slot),
+            None => structure.pumps[f.pump].flow(unknowns, moves.inputs[f.pump][0].1),
+        });
         let mut made = Self {
             mode: Mode { feeds: feeds.collect(), full: vec![false; n] },
             scratch: Scratch::new(structure),
-            next: vec![1; structure.feeds.len()],
+            next: structure.feeds.iter().map(|f| usize::from(f.in_air.is_none())).collect(),
             time_s: moves.time_s[0],
             z: zero.clone(),
             f: zero.clone(),

@@ -25,7 +25,7 @@ pub(super) fn verdicts(
     validate: Option<&RecordFit>,
     tests: &[ResidualTests],
 ) -> Vec<GreyBoxVerdict> {
-    let fit_percent = train.outputs.iter().map(|o| o.fit_percent).fold(f64::INFINITY, f64::min);
+    let fit_percent = train.fit_percent;
     let mut found = Vec::new();
     if fit_percent < POOR {
         found.push(GreyBoxVerdict::Poor { fit_percent });
@@ -45,7 +45,9 @@ pub(super) fn verdicts(
         let [low, high] = p.bounds;
         if !told && p.interval_95[1] - p.interval_95[0] > TELLS * (high - low) {
             found.push(unknown(parameters, &p.name));
-        } else if !told && let Some(bound) = p.bounds.into_iter().find(|b| *b == p.value && !natural(&free[i], *b)) {
+        } else if !told
+            && let Some(bound) = p.bounds.into_iter().find(|b| *b == p.value && !natural(&free[i], *b))
+        {
             found.push(GreyBoxVerdict::AtBound { name: p.name.clone(), bound });
         }
     }

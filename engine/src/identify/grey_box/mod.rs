@@ -6,7 +6,8 @@
 //!
 //! Sensitivities are exact: the variational equations are integrated along with the levels, and jump where an input
 //! arrives after a delay that is free and where a tank gets to a rim. Conventions: an input applies from its stamp until
-//! the next one and had its first value before; pumps always find water. A missing output (NaN) is passed over, a missing
+//! the next one; what was in the air of a transport delay before the first is estimated along, as the initial levels are;
+//! pumps always find water. A missing output (NaN) is passed over, a missing
 //! input holds its last value.
 
 mod error;

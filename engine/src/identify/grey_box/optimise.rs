@@ -15,8 +15,9 @@ use super::structure::Structure;
 
 /// Step, as a share of the bounds' width, that ends the search.
 const SAME_STEP: f64 = 1e-10;
-/// Share of the sum of squares that a step has to gain to go on.
-const SAME_COST: f64 = 1e-13;
+/// Share of the sum of squares that a step has to gain to go on: far less than what moves an estimate by a hundredth of
+/// its standard error. Without noise every step gains nearly all, down to the integrator's own errors.
+const SAME_COST: f64 = 1e-10;
 
 /// Sum of squares with its normal equations.
 #[derive(Debug, Clone)]
@@ -100,16 +101,20 @@ impl Search<'_> {
                 next[i] = clamp(i, unknowns[i] + step);
             }
             let width = |i: usize| self.bounds[i][1] - self.bounds[i][0];
-            let moved = moving.iter().map(|&i| ((next[i] - unknowns[i]) / width(i)).abs()).fold(0.0, f64::max);
+            let moved =
+                moving.iter().map(|&i| ((next[i] - unknowns[i]) / width(i)).abs()).fold(0.0, f64::max);
             if moved < SAME_STEP {
+                break;
+            }
+            let change = DVector::from_fn(next.len(), |i, _| next[i] - unknowns[i]);
+            let predicted = 2.0 * change.dot(&sums.gradient) - change.dot(&(&sums.gram * &change));
+            if damping < 1.0 && predicted.abs() < SAME_COST * sums.cost {
                 break;
             }
             let there = self.sums(&next);
             runs += 1;
             let gained = sums.cost - there.cost;
             if gained > 0.0 {
-                let change = DVector::from_fn(next.len(), |i, _| next[i] - unknowns[i]);
-                let predicted = 2.0 * change.dot(&sums.gradient) - change.dot(&(&sums.gram * &change));
                 let ratio = gained / predicted.max(f64::MIN_POSITIVE);
                 damping = (damping * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(0.1)).max(1e-15);
                 growth = 2.0;

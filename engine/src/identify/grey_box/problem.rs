@@ -173,7 +173,8 @@ impl GreyBoxProblem {
     /// The rig with other values of its free parameters.
     #[must_use]
     pub fn spec_with(&self, values: &[f64]) -> crate::plant::RigSpec {
-        let targets: Vec<(Target, f64)> = self.free.iter().map(|f| f.target).zip(values.iter().copied()).collect();
+        let targets: Vec<(Target, f64)> =
+            self.free.iter().map(|f| f.target).zip(values.iter().copied()).collect();
         with_values(&self.network.spec, self.configuration, &targets)
     }
 
@@ -205,7 +206,12 @@ impl GreyBoxProblem {
         Ok(Structure::new(&self.network, self.configuration, &targets, &outputs))
     }
 
-    fn check_moves(&self, output: &RecordedOutput, values: &[f64], unknowns: usize) -> Result<(), GreyBoxError> {
+    fn check_moves(
+        &self,
+        output: &RecordedOutput,
+        values: &[f64],
+        unknowns: usize,
+    ) -> Result<(), GreyBoxError> {
         let name = self.output_name(output);
         let known: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         let needed = LEAST_ROWS.max(unknowns + SPARE_ROWS);
@@ -235,7 +241,8 @@ impl GreyBoxProblem {
         if raw.time_s[rows - 1] <= raw.time_s[0] || !raw.time_s.iter().all(|t| t.is_finite()) {
             return Err(GreyBoxError::NoTimeSpan);
         }
-        let lengths = raw.inputs.iter().map(|i| (self.network.spec.pumps[i.pump].signal.clone(), i.values.len()));
+        let lengths =
+            raw.inputs.iter().map(|i| (self.network.spec.pumps[i.pump].signal.clone(), i.values.len()));
         let lengths = lengths.chain(raw.outputs.iter().map(|o| (self.output_name(o), o.values.len())));
         if let Some((name, found)) = lengths.into_iter().find(|(_, length)| *length != rows) {
             return Err(GreyBoxError::Length { name, found, rows });
@@ -248,7 +255,10 @@ impl GreyBoxProblem {
                 Some(input) => inputs.push(self.input_moves(&raw.time_s, input)?),
                 None if used => {
                     let spec = &self.network.spec.pumps[pump];
-                    return Err(GreyBoxError::MissingInput { pump: spec.id.clone(), signal: spec.signal.clone() });
+                    return Err(GreyBoxError::MissingInput {
+                        pump: spec.id.clone(),
+                        signal: spec.signal.clone(),
+                    });
                 }
                 None => inputs.push(vec![(raw.time_s[0], self.network.spec.pumps[pump].initial)]),
             }

@@ -24,13 +24,18 @@ pub(super) fn initial_levels(
     let first = record.first(rows);
     let p = structure.parameters;
     let free: Vec<bool> = (0..unknowns.len()).map(|i| i >= p).collect();
-    let search =
-        Search { structure, record: &first, weights, bounds, free: &free, most_rounds: 25 };
+    let search = Search { structure, record: &first, weights, bounds, free: &free, most_rounds: 25 };
     let rim = |vessel: usize| structure.vessels[vessel].height.at(unknowns);
     let mut guesses = vec![unknowns.clone()];
     for share in SHARES {
         let mut guess = unknowns.clone();
         (0..structure.vessels.len()).for_each(|i| guess[p + i] = share * rim(i));
+        for feed in &structure.feeds {
+            if let Some(slot) = feed.in_air {
+                let input = record.moves.inputs[feed.pump][0].1;
+                guess[slot] = structure.pumps[feed.pump].flow(unknowns, input).cm3_s;
+            }
+        }
         guesses.push(guess);
     }
     for (gauge, values) in structure.gauges.iter().zip(&first.outputs) {

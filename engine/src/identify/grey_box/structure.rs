@@ -55,6 +55,8 @@ pub(super) struct PumpCurve {
 pub(super) struct Feed {
     pub pump: usize,
     pub delay: Quantity,
+    /// Place among the unknowns of the flow that was in the air before the first row.
+    pub in_air: Option<usize>,
     pub outlets: Vec<(usize, f64)>,
 }
 
@@ -66,7 +68,8 @@ pub(super) struct Gauge {
     pub offset: Quantity,
 }
 
-/// What is integrated. The unknowns are the free parameters in their order, then the initial level of every vessel.
+/// What is integrated. The unknowns are the free parameters in their order, then the initial level of every vessel, then
+/// the flow in the air of every pump with a delay.
 #[derive(Debug, Clone)]
 pub(super) struct Structure {
     pub vessels: Vec<Vessel>,
@@ -129,7 +132,7 @@ impl Structure {
             vessels: vessels.collect(),
             streams: streams(network, &slots, &vessel),
             pumps: (0..spec.pumps.len()).map(|pump| curve(&slots, pump)).collect(),
-            feeds: feeds(network, &slots, &vessel),
+            feeds: feeds(network, &slots, &vessel, free.len() + needed.len()),
             gauges: outputs.iter().map(gauge).collect(),
             parameters: free.len(),
             delta2: network.delta_cm.max(LEAST_DELTA_CM).powi(2),
@@ -138,7 +141,7 @@ impl Structure {
 
     /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
-        self.parameters + self.vessels.len()
+        self.parameters + self.vessels.len() + self.feeds.iter().filter(|f| f.in_air.is_some()).count()
     }
 }
 
@@ -174,7 +177,12 @@ fn curve(slots: &Slots, pump: usize) -> PumpCurve {
     }
 }
 
-fn feeds(network: &Network, slots: &Slots, vessel: &impl Fn(usize) -> Option<usize>) -> Vec<Feed> {
+fn feeds(
+    network: &Network,
+    slots: &Slots,
+    vessel: &impl Fn(usize) -> Option<usize>,
+    mut next_slot: usize,
+) -> Vec<Feed> {
     let mut feeds = Vec::new();
     for (pump, spec) in network.pumps.iter().enumerate() {
         let into = |&(tank, share): &(usize, f64)| Some((vessel(tank)?, share));
@@ -182,12 +190,14 @@ fn feeds(network: &Network, slots: &Slots, vessel: &impl Fn(usize) -> Option<usi
         if !outlets.is_empty() {
             let mut delay = slots.of(Target::PumpDelay(pump));
             delay.value = delay_s(slots.spec, slots.configuration, pump);
-            feeds.push(Feed { pump, delay, outlets });
+            let in_air = (delay.slot.is_some() || delay.value > 0.0).then_some(next_slot);
+            next_slot += usize::from(in_air.is_some());
+            feeds.push(Feed { pump, delay, in_air, outlets });
         }
         if let Some(source) = spec.from.and_then(vessel) {
             // What is drawn leaves at once, whatever the stream takes to arrive.
             let delay = Quantity { value: 0.0, factor: 1.0, slot: None };
-            feeds.push(Feed { pump, delay, outlets: vec![(source, -1.0)] });
+            feeds.push(Feed { pump, delay, in_air: None, outlets: vec![(source, -1.0)] });
         }
     }
     feeds

@@ -7,12 +7,12 @@ use crate::explain::{Explain, number};
 pub enum GreyBoxVerdict {
     /// Nothing to object to.
     Good {
-        /// Fit in percent: the worst of the outputs'.
+        /// Fit in percent, of all outputs together.
         fit_percent: f64,
     },
     /// The rig with its best parameters does not follow the record.
     Poor {
-        /// Fit in percent: the worst of the outputs'.
+        /// Fit in percent, of all outputs together.
         fit_percent: f64,
     },
     /// The outputs do not depend on a parameter in this record.
