@@ -178,7 +178,7 @@ fn sensitivities_are_those_of_differences() {
         }
         let (_, slopes) = simulate_rig(&problem, &at).expect("a simulation");
         for i in 0..at.len() {
-            let step = 1e-4 * at[i].abs().max(1.0);
+            let step = 2e-5 * at[i].abs().max(1.0);
             let moved = |by: f64| {
                 let mut at = at.clone();
                 at[i] += by;

@@ -14,6 +14,10 @@ use super::{GreyBoxError, GreyBoxVerdict};
 
 /// Rows from which the initial levels of a record are estimated; in the fitted record they are refined with the rest.
 pub const INITIAL_SAMPLES: usize = 50;
+/// Steps of a search.
+const MOST_ROUNDS: usize = 200;
+/// Change of an output's weight against the first one's that needs no further search.
+const SAME_WEIGHT: f64 = 0.05;
 /// Rounds in which the weights of several outputs follow their noise.
 const WEIGHT_ROUNDS: usize = 3;
 /// Least noise of an output, as a share of its movement: records without noise have weights all the same.
@@ -97,77 +101,82 @@ pub struct GreyBoxFit {
 /// [`GreyBoxError`] for a problem that cannot be.
 pub fn fit_rig(problem: &GreyBoxProblem) -> Result<GreyBoxFit, GreyBoxError> {
     let (structure, train, validate) = problem.checked()?;
-    let mut bounds: Vec<[f64; 2]> = problem.free.iter().map(|f| f.bounds).collect();
-    let mut start: Vec<f64> = problem.free.iter().map(|f| f.start).collect();
-    for vessel in &structure.vessels {
-        let rim = problem.free.iter().zip(&bounds).enumerate();
-        let free_rim = rim.filter(|(i, _)| vessel.height.slot == Some(*i)).map(|(_, (_, b))| b[1]).next();
-        let rim = free_rim.unwrap_or(vessel.height.value);
-        bounds.push([0.0, rim]);
-        start.push(problem.network.spec.tanks[vessel.tank].initial_cm.min(rim));
-    }
-    for feed in structure.feeds.iter().filter(|f| f.in_air.is_some()) {
-        let (curve, unknowns) = (&structure.pumps[feed.pump], &start);
-        let first = curve.flow(unknowns, train.moves.inputs[feed.pump][0].1).cm3_s;
-        let most = curve.points.iter().map(|p| curve.flow(unknowns, p.0).cm3_s).fold(first, f64::max);
-        bounds.push([0.0, MOST_IN_AIR * most.max(1e-9)]);
-        start.push(first);
-    }
+    let (bounds, mut start) = bounds_and_start(problem, &structure, &train);
     let spread: Vec<f64> = train.outputs.iter().map(|o| deviation(o)).collect();
-    let mut weights: Vec<f64> = spread.iter().map(|s| 1.0 / (s * s)).collect();
+    let weights: Vec<f64> = spread.iter().map(|s| 1.0 / (s * s)).collect();
     initial_levels(&structure, &train, &weights, &bounds, INITIAL_SAMPLES, &mut start);
-    let free = vec![true; start.len()];
-    let mut found: Option<Found> = None;
-    let rounds = if train.outputs.len() == 1 { 1 } else { WEIGHT_ROUNDS };
-    let mut runs = 0;
-    for round in 0..rounds {
-        let search = Search {
-            structure: &structure,
-            record: &train,
-            weights: &weights,
-            bounds: &bounds,
-            free: &free,
-            most_rounds: 200,
-        };
-        let mut next = search.descend(found.as_ref().map_or(&start, |f| &f.unknowns));
-        let known: usize = train.outputs.iter().map(|o| o.iter().filter(|v| v.is_finite()).count()).sum();
-        if round == 0 && (next.sums.cost / known as f64).sqrt() > BADLY {
-            next = elsewhere(&search, &next);
-        }
-        runs += next.runs;
-        let left = errors(&structure, &train, &next.unknowns);
-        found = Some(next);
-        let noise = left.iter().zip(&spread).map(|(l, s)| l.max(LEAST_NOISE * s));
-        let settled: Vec<f64> = noise.map(|n| 1.0 / (n * n)).collect();
-        let moved =
-            settled.iter().zip(&weights).any(|(a, b)| (a / settled[0] / (b / weights[0]) - 1.0).abs() > 0.05);
-        weights = settled;
-        if !moved {
-            break;
-        }
-    }
-    let Some(found) = found else { return Err(GreyBoxError::NoOutput) };
-    let sums = Search {
+    let all = vec![true; start.len()];
+    let mut search = Search {
         structure: &structure,
         record: &train,
-        weights: &weights,
+        weights,
         bounds: &bounds,
-        free: &free,
-        most_rounds: 0,
-    }
-    .sums(&found.unknowns);
+        free: &all,
+        most_rounds: MOST_ROUNDS,
+    };
+    let (mut found, runs) = descend_weighted(&mut search, &start, &spread);
+    found.sums = search.sums(&found.unknowns);
     let shown = judged(problem, &structure, &train, &found.unknowns);
     let tests = tests(&structure, &train, &shown);
-    let knowledge = Knowledge::new(problem, &train, &sums, &tests);
+    let knowledge = Knowledge::new(problem, &train, &found.sums, &tests);
     let parameters = knowledge.parameters(problem, &found.unknowns);
     let other = validate.map(|record| {
         let mut unknowns = found.unknowns.clone();
-        initial_levels(&structure, &record, &weights, &bounds, INITIAL_SAMPLES, &mut unknowns);
+        initial_levels(&structure, &record, &search.weights, &bounds, INITIAL_SAMPLES, &mut unknowns);
         judged(problem, &structure, &record, &unknowns)
     });
     let verdicts = judge::verdicts(&problem.free, &parameters, &knowledge, &shown, other.as_ref(), &tests);
     let initial_samples = INITIAL_SAMPLES.min(train.rows());
     Ok(GreyBoxFit { parameters, train: shown, validate: other, initial_samples, tests, verdicts, runs })
+}
+
+/// Bounds and start of every unknown: parameters as marked, initial levels from the floor to the rim, what is in the air.
+fn bounds_and_start(
+    problem: &GreyBoxProblem,
+    structure: &Structure,
+    record: &Record,
+) -> (Vec<[f64; 2]>, Vec<f64>) {
+    let mut bounds: Vec<[f64; 2]> = problem.free.iter().map(|f| f.bounds).collect();
+    let mut start: Vec<f64> = problem.free.iter().map(|f| f.start).collect();
+    for vessel in &structure.vessels {
+        let rim = vessel.height.slot.map_or(vessel.height.value, |slot| problem.free[slot].bounds[1]);
+        bounds.push([0.0, rim]);
+        start.push(problem.network.spec.tanks[vessel.tank].initial_cm.min(rim));
+    }
+    for feed in structure.feeds.iter().filter(|f| f.in_air.is_some()) {
+        let curve = &structure.pumps[feed.pump];
+        let first = curve.flow(&start, record.moves.inputs[feed.pump][0].1).cm3_s;
+        let most = curve.points.iter().map(|p| curve.flow(&start, p.0).cm3_s).fold(first, f64::max);
+        bounds.push([0.0, MOST_IN_AIR * most.max(1e-9)]);
+        start.push(first);
+    }
+    (bounds, start)
+}
+
+/// Searches from a start, other starts where that leads nowhere, until the weights of the outputs are those of their noise;
+/// gives the simulations it took as well.
+fn descend_weighted(search: &mut Search, start: &[f64], spread: &[f64]) -> (Found, usize) {
+    let mut found = search.descend(start);
+    let outputs = &search.record.outputs;
+    let known: usize = outputs.iter().map(|o| o.iter().filter(|v| v.is_finite()).count()).sum();
+    if (found.sums.cost / known as f64).sqrt() > BADLY {
+        found = elsewhere(search, &found);
+    }
+    let mut runs = found.runs;
+    for _ in 1..WEIGHT_ROUNDS {
+        let left = errors(search.structure, search.record, &found.unknowns);
+        let noise = left.iter().zip(spread).map(|(l, s)| l.max(LEAST_NOISE * s));
+        let settled: Vec<f64> = noise.map(|n| 1.0 / (n * n)).collect();
+        let ratio = |(a, b): (&f64, &f64)| (a / settled[0] / (b / search.weights[0]) - 1.0).abs();
+        let moved = settled.iter().zip(&search.weights).map(ratio).fold(0.0, f64::max);
+        search.weights = settled;
+        if moved < SAME_WEIGHT {
+            break;
+        }
+        found = search.descend(&found.unknowns);
+        runs += found.runs;
+    }
+    (found, runs)
 }
 
 /// Simulates the outputs of a problem's record with every free parameter and initial level given: rows by outputs, with

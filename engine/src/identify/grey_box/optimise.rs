@@ -32,7 +32,7 @@ pub(super) struct Search<'a> {
     pub structure: &'a Structure,
     pub record: &'a Record,
     /// Weight of each output's rows, in 1/cm².
-    pub weights: &'a [f64],
+    pub weights: Vec<f64>,
     pub bounds: &'a [[f64; 2]],
     pub free: &'a [bool],
     pub most_rounds: usize,
@@ -50,7 +50,7 @@ pub(super) struct Found {
 impl Search<'_> {
     /// Sum of squares at these unknowns, with its slopes.
     pub fn sums(&self, unknowns: &[f64]) -> Sums {
-        let (p, outputs, weights) = (unknowns.len(), &self.record.outputs, self.weights);
+        let (p, outputs, weights) = (unknowns.len(), &self.record.outputs, &self.weights);
         let (mut cost, mut gradient) = (0.0, vec![0.0; p]);
         let mut gram = vec![0.0; p * p];
         let mut run = FreeRun::new(self.structure, &self.record.moves, unknowns, true);
