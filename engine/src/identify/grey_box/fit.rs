@@ -157,9 +157,9 @@ fn bounds_and_start(
 /// gives the simulations it took as well.
 fn descend_weighted(search: &mut Search, start: &[f64], spread: &[f64]) -> (Found, usize) {
     let mut found = search.descend(start);
-    let outputs = &search.record.outputs;
-    let known: usize = outputs.iter().map(|o| o.iter().filter(|v| v.is_finite()).count()).sum();
-    if (found.sums.cost / known as f64).sqrt() > BADLY {
+    let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let left = errors(search.structure, search.record, &found.unknowns);
+    if square(&left) > BADLY * BADLY * square(spread) {
         found = elsewhere(search, &found);
     }
     let mut runs = found.runs;
