@@ -46,9 +46,10 @@ pub(super) fn list<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[f64; 2]>, 
 }
 
 /// Pairs by tag and field.
-pub(super) fn by_tag<'de, D: Deserializer<'de>>(
-    from: D,
-) -> Result<BTreeMap<String, BTreeMap<String, [f64; 2]>>, D::Error> {
+pub(super) type ByTag = BTreeMap<String, BTreeMap<String, [f64; 2]>>;
+
+/// Pairs by tag and field.
+pub(super) fn by_tag<'de, D: Deserializer<'de>>(from: D) -> Result<ByTag, D::Error> {
     let read = BTreeMap::<String, BTreeMap<String, TwoNumbers>>::deserialize(from)?;
     let fields = |fields: BTreeMap<String, TwoNumbers>| fields.into_iter().map(|(k, v)| (k, v.0)).collect();
     Ok(read.into_iter().map(|(tag, of)| (tag, fields(of))).collect())

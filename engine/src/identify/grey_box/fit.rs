@@ -179,15 +179,15 @@ fn descend_weighted(search: &mut Search, start: &[f64], spread: &[f64]) -> (Foun
     (found, runs)
 }
 
+/// Simulated outputs, a row each, and their derivatives: by output, row and unknown.
+pub type Simulated = (Vec<Vec<f64>>, Vec<Vec<Vec<f64>>>);
+
 /// Simulates the outputs of a problem's record with every free parameter and initial level given: rows by outputs, with
 /// the derivatives of each by the unknowns: parameters, initial levels, then the flow in the air of every pump with a delay.
 ///
 /// # Errors
 /// [`GreyBoxError`] for a problem that cannot be.
-pub fn simulate_rig(
-    problem: &GreyBoxProblem,
-    unknowns: &[f64],
-) -> Result<(Vec<Vec<f64>>, Vec<Vec<Vec<f64>>>), GreyBoxError> {
+pub fn simulate_rig(problem: &GreyBoxProblem, unknowns: &[f64]) -> Result<Simulated, GreyBoxError> {
     let structure = problem.structure()?;
     let record = problem.record(&structure, &problem.train)?;
     let mut values = vec![Vec::new(); record.outputs.len()];

@@ -244,7 +244,7 @@ impl<'a> FreeRun<'a> {
         self.step(h, true);
         let (beyond, _) = self.beyond();
         let at_rim = beyond > 0.0;
-        let h = if at_rim { self.to_rim(h, beyond) } else { h };
+        let h = if at_rim { self.time_to_rim(h, beyond) } else { h };
         if at_rim {
             self.step(h, true);
         }
@@ -259,7 +259,7 @@ impl<'a> FreeRun<'a> {
     }
 
     /// Length of the step at which the first rim is passed, by bisection and the rule of false position.
-    fn to_rim(&mut self, h: f64, beyond: f64) -> f64 {
+    fn time_to_rim(&mut self, h: f64, beyond: f64) -> f64 {
         let (mut low, mut high) = (0.0, h);
         let (mut at_low, mut at_high) = (None, beyond);
         for round in 0..60 {

@@ -23,7 +23,9 @@ mod target;
 mod verdict;
 
 pub use error::GreyBoxError;
-pub use fit::{GreyBoxFit, INITIAL_SAMPLES, OutputFit, RecordFit, RigParameter, fit_rig, simulate_rig};
+pub use fit::{
+    GreyBoxFit, INITIAL_SAMPLES, OutputFit, RecordFit, RigParameter, Simulated, fit_rig, simulate_rig,
+};
 pub use problem::{
     FreeParameter, GreyBoxProblem, GreyBoxRecord, RecordedInput, RecordedOutput, input_named, output_named,
 };

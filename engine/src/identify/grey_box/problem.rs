@@ -40,7 +40,7 @@ impl FreeParameter {
     ) -> Result<Self, GreyBoxError> {
         let target = Target::parse(&network.spec, name)?;
         let (name, [low, high]) = (target.name(&network.spec), bounds);
-        if !(low < high) {
+        if low.is_nan() || high.is_nan() || low >= high {
             return Err(GreyBoxError::BoundsOrder { name, low, high });
         }
         let [least, most] = target.possible();
@@ -234,7 +234,7 @@ impl GreyBoxProblem {
             return Err(GreyBoxError::TooFewRows { name: "time".to_owned(), rows, needed: LEAST_ROWS });
         }
         for (row, pair) in raw.time_s.windows(2).enumerate() {
-            if !(pair[1] >= pair[0]) {
+            if pair[1].is_nan() || pair[1] < pair[0] {
                 return Err(GreyBoxError::TimeBackwards { row: row + 2, from_s: pair[0], to_s: pair[1] });
             }
         }
