@@ -15,9 +15,6 @@ use super::structure::Structure;
 
 /// Step, as a share of the bounds' width, that ends the search.
 const SAME_STEP: f64 = 1e-10;
-/// Share of the sum of squares that a step has to gain to go on: far less than what moves an estimate by a hundredth of
-/// its standard error. Without noise every step gains nearly all, down to the integrator's own errors.
-const SAME_COST: f64 = 1e-10;
 
 /// Sum of squares with its normal equations.
 #[derive(Debug, Clone)]
@@ -36,6 +33,9 @@ pub(super) struct Search<'a> {
     pub bounds: &'a [[f64; 2]],
     pub free: &'a [bool],
     pub most_rounds: usize,
+    /// Share of the sum of squares that a step has to gain to go on. Without noise every step gains nearly all, down to
+    /// the integrator's own errors.
+    pub same_cost: f64,
 }
 
 /// Where a search ended.
@@ -108,7 +108,7 @@ impl Search<'_> {
             }
             let change = DVector::from_fn(next.len(), |i, _| next[i] - unknowns[i]);
             let predicted = 2.0 * change.dot(&sums.gradient) - change.dot(&(&sums.gram * &change));
-            if damping < 1.0 && predicted.abs() < SAME_COST * sums.cost {
+            if damping < 1.0 && predicted.abs() < self.same_cost * sums.cost {
                 break;
             }
             let there = self.sums(&next);
@@ -118,7 +118,7 @@ impl Search<'_> {
                 let ratio = gained / predicted.max(f64::MIN_POSITIVE);
                 damping = (damping * (1.0 - (2.0 * ratio - 1.0).powi(3)).max(0.1)).max(1e-15);
                 growth = 2.0;
-                let ends = gained < SAME_COST * sums.cost;
+                let ends = gained < self.same_cost * sums.cost;
                 (unknowns, sums) = (next, there);
                 if ends {
                     break;

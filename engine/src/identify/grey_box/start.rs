@@ -24,8 +24,15 @@ pub(super) fn initial_levels(
     let first = record.first(rows);
     let p = structure.parameters;
     let free: Vec<bool> = (0..unknowns.len()).map(|i| i >= p).collect();
-    let search =
-        Search { structure, record: &first, weights: weights.to_vec(), bounds, free: &free, most_rounds: 25 };
+    let search = Search {
+        structure,
+        record: &first,
+        weights: weights.to_vec(),
+        bounds,
+        free: &free,
+        most_rounds: 25,
+        same_cost: 1e-8,
+    };
     let rim = |vessel: usize| structure.vessels[vessel].height.at(unknowns);
     let mut guesses = vec![unknowns.clone()];
     for share in SHARES {
