@@ -7,6 +7,7 @@ pub mod experiment;
 pub mod log;
 pub mod recording;
 pub mod rig;
+pub mod rig_fitted;
 mod rig_lines;
 pub mod settings;
 pub mod structured_text;

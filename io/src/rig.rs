@@ -21,7 +21,7 @@ pub struct Preset {
 }
 
 /// The presets, the first being the one that opens.
-pub const PRESETS: [Preset; 8] = [
+pub const PRESETS: [Preset; 9] = [
     Preset { id: "stad", text: include_str!("../../assets/rigs/stad.toml") },
     Preset { id: "simtank1", text: include_str!("../../assets/rigs/simtank1.toml") },
     Preset { id: "simtank2", text: include_str!("../../assets/rigs/simtank2.toml") },
@@ -30,6 +30,7 @@ pub const PRESETS: [Preset; 8] = [
     Preset { id: "quadruple_minimum", text: include_str!("../../assets/rigs/quadruple_minimum.toml") },
     Preset { id: "quadruple_nonminimum", text: include_str!("../../assets/rigs/quadruple_nonminimum.toml") },
     Preset { id: "coupled_tanks", text: include_str!("../../assets/rigs/coupled_tanks.toml") },
+    Preset { id: "cascaded_tanks", text: include_str!("../../assets/rigs/cascaded_tanks.toml") },
 ];
 
 /// Why a rig or scenario file cannot be used.
@@ -222,6 +223,18 @@ pub fn load_rig(id_or_path: &str) -> Result<Arc<Network>, FileError> {
     }
     let path = Path::new(id_or_path);
     parse_rig(&file_name(path), &read_text(path)?)
+}
+
+/// The text of a rig by preset id, or by path of a file; with the name that stands in errors.
+///
+/// # Errors
+/// [`FileError::Read`].
+pub fn rig_text(id_or_path: &str) -> Result<(String, String), FileError> {
+    if let Some(preset) = PRESETS.iter().find(|p| p.id == id_or_path) {
+        return Ok((format!("{id_or_path}.toml"), preset.text.to_owned()));
+    }
+    let path = Path::new(id_or_path);
+    Ok((file_name(path), read_text(path)?))
 }
 
 /// A scenario file, and the rig it names (a preset, or a file beside it).

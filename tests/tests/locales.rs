@@ -11,6 +11,7 @@ use vasos_engine::document::DocumentError;
 use vasos_engine::excitation::{ExcitationError, ExcitationWarning, StopReason};
 use vasos_engine::experiment::{ExperimentError, RunError};
 use vasos_engine::explain::Explain;
+use vasos_engine::identify::grey_box::{GreyBoxError, GreyBoxVerdict};
 use vasos_engine::identify::{FitError, FitVerdict, ReactionCurveError, RecordFinding};
 use vasos_engine::model::{ModelError, ReduceError, StateSpaceError};
 use vasos_engine::plant::{LinearError, RigError};
@@ -226,6 +227,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("FitError", boxed(FitError::samples())),
         ("ReactionCurveError", boxed(ReactionCurveError::samples())),
         ("FitVerdict", boxed(FitVerdict::samples())),
+        ("GreyBoxError", boxed(GreyBoxError::samples())),
+        ("GreyBoxVerdict", boxed(GreyBoxVerdict::samples())),
         ("RecordFinding", boxed(RecordFinding::samples())),
         ("ExpressionError", boxed(ExpressionError::samples())),
         ("RuleError", boxed(RuleError::samples())),

@@ -9,6 +9,7 @@ mod controller;
 mod ensemble;
 mod excite;
 mod experiment;
+mod fit_plant;
 mod identify;
 mod json;
 mod model;
@@ -36,6 +37,7 @@ Examples:
   vasos excite stad --loop LIC-02 --relay 0.3
   vasos compare run.toml --recording run.csv --column h2_cm
   vasos identify step.csv --pv h2 --mv u --json
+  vasos fit-plant stad log.csv --input u=u_v --output h3=h3_cm --fit FV03.k90=20..150
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
   vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
   vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series
@@ -65,6 +67,8 @@ pub enum Command {
     Compare(compare::Arguments),
     /// Fit a process model to a log.
     Identify(identify::Arguments),
+    /// Fit parameters of a rig to a recording: the tank network's own laws, simulated in free run.
+    FitPlant(fit_plant::Arguments),
     /// Tune a controller for a model by published rules.
     Tune(tune::Arguments),
     /// Judge a controller on a model: stability, margins, sensitivities, responses.
@@ -75,8 +79,6 @@ pub enum Command {
     Experiment(experiment::Arguments),
     /// Not available yet: identify, tune, compare and report in one go.
     Retune(Later),
-    /// Not available yet: fit a rig to a recording.
-    FitPlant(Later),
     /// Not available yet: serve a simulated rig to other programs.
     Serve(Later),
     /// Not available yet: record a live rig.
@@ -157,12 +159,12 @@ pub fn run(cli: Cli) -> CliOutcome {
         Command::Excite(arguments) => excite::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
+        Command::FitPlant(arguments) => fit_plant::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Analyze(arguments) => analyze::run(arguments),
         Command::Controller(arguments) => controller::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments),
         Command::Retune(_) => Err(Refusal::later("vasos retune")),
-        Command::FitPlant(_) => Err(Refusal::later("vasos fit-plant")),
         Command::Serve(_) => Err(Refusal::later("vasos serve")),
         Command::Record(_) => Err(Refusal::later("vasos record")),
         Command::Replay(_) => Err(Refusal::later("vasos replay")),
@@ -216,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_is_to_come_says_so() {
-        for command in ["retune", "fit-plant", "serve", "record", "replay"] {
+        for command in ["retune", "serve", "record", "replay"] {
             assert_eq!(outcome(&[command, "--list", "x"]), CliOutcome::Exit(2), "{command}");
         }
     }

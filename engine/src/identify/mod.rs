@@ -9,6 +9,8 @@
 //! refined on all its rows by Gauss–Newton with the linear unknowns projected out. [`fit_fopdt`] is the short cut for
 //! a first order alone. [`simulate_fopdt`] runs a model over a record with the same sampling.
 //!
+//! [`grey_box`] fits chosen parameters of a whole rig to a recording instead.
+//!
 //! Convention of records: a row's MV applies from its time stamp until the next one; its PV was measured just
 //! before the stamp. Policy for non-finite numbers: a row that holds one is refused with its number.
 
@@ -17,6 +19,7 @@ mod error;
 mod fit_structure;
 mod fopdt;
 mod gram;
+pub mod grey_box;
 mod judge;
 mod model_fit;
 mod optimise;

@@ -84,12 +84,12 @@ impl Flows {
                 self.spilling[i] = true;
                 let net = std::mem::take(&mut self.net_cm3_s[i]);
                 if let Some(to) = tank.spills_to {
-                    self.net_cm3_s[to] += net;
+                    self.net_cm3_s[to] += tank.spill_share * net;
                 }
                 for j in 0..n {
                     let slope = std::mem::take(&mut self.slope_cm2_s[i * n + j]);
                     if let Some(to) = tank.spills_to {
-                        self.slope_cm2_s[to * n + j] += slope;
+                        self.slope_cm2_s[to * n + j] += tank.spill_share * slope;
                     }
                 }
             }
@@ -99,13 +99,15 @@ impl Flows {
         }
     }
 
-    /// Where a stream into tank `i` ends up: itself, or the first tank down the spills that holds it.
-    pub fn destination(&self, network: &Network, i: usize) -> Option<usize> {
-        let mut at = i;
+    /// Where a stream into tank `i` ends up: itself, or the first tank down the spills that holds it; and the share of
+    /// the stream that gets there.
+    pub fn destination(&self, network: &Network, i: usize) -> Option<(usize, f64)> {
+        let (mut at, mut share) = (i, 1.0);
         for _ in 0..self.spilling.len() {
             if !self.spilling[at] {
-                return Some(at);
+                return Some((at, share));
             }
+            share *= network.tanks[at].spill_share;
             at = network.tanks[at].spills_to?;
         }
         None
@@ -115,8 +117,8 @@ impl Flows {
     pub fn pump_column(&self, network: &Network, pump: usize, mut add: impl FnMut(usize, f64)) {
         let pump = &network.pumps[pump];
         let mut into = |tank: usize, share: f64| {
-            if let Some(to) = self.destination(network, tank) {
-                add(to, share);
+            if let Some((to, kept)) = self.destination(network, tank) {
+                add(to, share * kept);
             }
         };
         for &(to, share) in &pump.outlets {

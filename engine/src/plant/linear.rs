@@ -181,7 +181,8 @@ pub fn linearise(
     let (mut pump_slopes, mut on_a_break) = (Vec::with_capacity(pumped.len()), Vec::new());
     for (pump, spec) in network.spec.pumps.iter().enumerate() {
         let (slope, broken) = slope_at(spec, point.inputs[pump], options.side);
-        let draws = network.pumps[pump].from.and_then(|from| flows.destination(network, from)).and_then(row);
+        let source = network.pumps[pump].from.and_then(|from| flows.destination(network, from));
+        let draws = source.and_then(|(tank, _)| row(tank));
         if point.delays_s[pump] > 0.0 && draws.is_some() {
             return Err(LinearError::TwoDelays { pump: spec.id.clone(), delay_s: point.delays_s[pump] });
         }
@@ -279,8 +280,9 @@ fn valve_columns(
         let mut column = vec![0.0; states.len()];
         for (tank, sign) in [(Some(valve.from), -1.0), (valve.to, 1.0)] {
             let into = tank.and_then(|tank| flows.destination(network, tank));
-            if let Some(row) = into.and_then(|tank| states.iter().position(|&s| s == tank)) {
-                column[row] += sign * slope / network.tanks[states[row]].area_cm2;
+            let row = |(tank, share)| Some((states.iter().position(|&s| s == tank)?, share));
+            if let Some((row, share)) = into.and_then(row) {
+                column[row] += share * sign * slope / network.tanks[states[row]].area_cm2;
             }
         }
         columns.push(column, 0.0, port);

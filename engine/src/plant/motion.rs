@@ -51,6 +51,8 @@ pub(crate) struct Motion<const N: usize, const S: usize, V> {
     pub(super) areas: [V; N],
     /// Node that takes each tank's spill.
     pub(super) spills_to: Vec<usize>,
+    /// Share of each tank's spill that gets there.
+    pub(super) spill_shares: Vec<f64>,
     /// Levels of the nodes where the step began, and where it ends: the state of the integrator.
     pub(super) start: [V; N],
     pub end: [V; N],
@@ -145,6 +147,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
             heights,
             areas,
             spills_to: network.tanks.iter().map(|t| t.spills_to.unwrap_or(outside)).collect(),
+            spill_shares: network.tanks.iter().map(|t| t.spill_share).collect(),
             start: zero,
             end: zero,
             now: zero,

@@ -28,6 +28,8 @@ pub struct Tank {
     pub height_cm: f64,
     /// Tank that takes the spill; `None`: the outside.
     pub spills_to: Option<usize>,
+    /// Share of the spill that gets there; the rest goes outside.
+    pub spill_share: f64,
 }
 
 /// One pump of the network.
@@ -257,7 +259,8 @@ fn tanks(spec: &RigSpec) -> Result<Vec<Tank>, RigError> {
             if spills_to.is_some_and(|o| spec.tanks[o].id == t.id) {
                 return Err(RigError::Loop { item: t.id.clone(), tank: t.id.clone() });
             }
-            Ok(Tank { area_cm2: t.area_cm2, height_cm: t.height_cm, spills_to })
+            demand(&t.id, "spill_share", t.spill_share, (0.0..=1.0).contains(&t.spill_share), "0…1")?;
+            Ok(Tank { area_cm2: t.area_cm2, height_cm: t.height_cm, spills_to, spill_share: t.spill_share })
         })
         .collect()
 }

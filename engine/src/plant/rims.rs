@@ -79,7 +79,8 @@ impl<const N: usize, const S: usize> Motion<N, S, f64> {
             for i in 0..self.tanks {
                 if levels[i] >= self.heights[i] && slope[i] > 0.0 {
                     let to = self.spills_to[i];
-                    slope[to] += slope[i] * self.areas[i] * self.streams.per_area[to];
+                    let spill = slope[i] * self.areas[i] * self.spill_shares[i];
+                    slope[to] += spill * self.streams.per_area[to];
                     slope[i] = 0.0;
                     handed = true;
                 }
@@ -235,7 +236,9 @@ impl<const N: usize, const S: usize> Motion<N, S, f64> {
                 if excess > 1e-15 * tank.height_cm * tank.area_cm2 {
                     volumes.spilled[i] += excess;
                     volumes.after[i] -= excess;
-                    volumes.after[tank.spills_to.unwrap_or(outside)] += excess;
+                    let kept = excess * tank.spill_share;
+                    volumes.after[tank.spills_to.unwrap_or(outside)] += kept;
+                    volumes.after[outside] += excess - kept;
                     spills = true;
                 }
             }

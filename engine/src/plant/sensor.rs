@@ -75,6 +75,8 @@ pub struct Transmitter {
     /// Standard deviation of the noise in cm.
     pub(crate) noise_cm: f64,
     resolution_cm: f64,
+    /// Gain and zero in cm of a sensor that is off its calibration.
+    calibration: Option<(f64, f64)>,
     current: Option<Current>,
     sample_time_s: f64,
     ills: Ills,
@@ -116,6 +118,8 @@ impl Transmitter {
         Self {
             noise_cm: sensor.noise_cm,
             resolution_cm: sensor.resolution_cm,
+            calibration: (sensor.gain != 1.0 || sensor.offset_cm != 0.0)
+                .then_some((sensor.gain, sensor.offset_cm)),
             current: sensor.range_cm.map(current),
             sample_time_s,
             ills: Ills::default(),
@@ -169,9 +173,12 @@ impl Transmitter {
         reading
     }
 
-    /// A level through the sensor's resolution, the signal and the converter.
+    /// A level through the sensor's calibration, its resolution, the signal and the converter.
     #[inline(always)]
     pub(crate) fn show<V: Number>(&self, mut level_cm: V, how: Measurement) -> Shown<V> {
+        if let Some((gain, offset_cm)) = self.calibration {
+            level_cm = level_cm * gain + V::of(offset_cm);
+        }
         if how.resolution && self.resolution_cm > 0.0 {
             level_cm = nearest(level_cm * (1.0 / self.resolution_cm)) * self.resolution_cm;
         }
@@ -219,6 +226,8 @@ mod tests {
                 noise_cm: 0.03,
                 range_cm: Some([1.5, 25.5]),
                 resolution_cm: 0.35,
+                gain: 1.0,
+                offset_cm: 0.0,
             },
             ConverterSpec {
                 adc_bits: 12,

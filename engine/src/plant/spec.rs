@@ -69,6 +69,9 @@ pub struct RigSpec {
     /// Named settings of valves, delays and loops; the first one is the start.
     #[serde(rename = "configuration", default)]
     pub configurations: Vec<ConfigurationSpec>,
+    /// Parameters that a fit to a recording may change, with their bounds: by tag, then by field.
+    #[serde(default, deserialize_with = "two_numbers::by_tag")]
+    pub fit: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
 }
 
 /// One tank.
@@ -87,6 +90,9 @@ pub struct TankSpec {
     pub initial_cm: f64,
     /// Tank that takes what this one spills; absent: the water is lost to the outside.
     pub spills_to: Option<String>,
+    /// Share of the spill, from 0 to 1, that gets there; the rest is lost to the outside.
+    #[serde(default = "one")]
+    pub spill_share: f64,
     /// Place in the drawing: column and row of the tank's middle, in grid units.
     #[serde(default, deserialize_with = "two_numbers::optional")]
     pub at: Option<[f64; 2]>,
@@ -233,6 +239,12 @@ pub struct SensorSpec {
     /// Smallest difference it tells apart in cm, applied when resolution is switched on.
     #[serde(default)]
     pub resolution_cm: f64,
+    /// What it shows is `gain · level + offset_cm`: 1 where it is calibrated.
+    #[serde(default = "one")]
+    pub gain: f64,
+    /// Zero of the sensor in cm.
+    #[serde(default)]
+    pub offset_cm: f64,
 }
 
 /// Analogue converters between plant and controller.

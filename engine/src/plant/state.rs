@@ -401,11 +401,11 @@ impl Plant {
         if excess > 0.0 {
             match t.spills_to {
                 Some(other) => {
-                    let o = &self.network.tanks[other];
-                    let filled = self.levels_cm[other] + excess / o.area_cm2;
+                    let (o, kept) = (&self.network.tanks[other], excess * t.spill_share);
+                    let filled = self.levels_cm[other] + kept / o.area_cm2;
                     self.levels_cm[other] = filled.min(o.height_cm);
-                    let excess = (filled - o.height_cm).max(0.0) * o.area_cm2;
-                    self.lose(excess);
+                    let over = (filled - o.height_cm).max(0.0) * o.area_cm2;
+                    self.lose(excess - kept + over);
                 }
                 None => self.lose(excess),
             }

@@ -1,5 +1,6 @@
 //! Pairs of numbers in files. An array alone takes the first two of a longer list without a word.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::de::{Error, SeqAccess, Visitor};
@@ -42,4 +43,14 @@ pub(super) fn optional<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64
 /// A list of pairs.
 pub(super) fn list<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<[f64; 2]>, D::Error> {
     Ok(Vec::<TwoNumbers>::deserialize(from)?.into_iter().map(|pair| pair.0).collect())
+}
+
+/// Pairs by tag and field.
+pub(super) type ByTag = BTreeMap<String, BTreeMap<String, [f64; 2]>>;
+
+/// Pairs by tag and field.
+pub(super) fn by_tag<'de, D: Deserializer<'de>>(from: D) -> Result<ByTag, D::Error> {
+    let read = BTreeMap::<String, BTreeMap<String, TwoNumbers>>::deserialize(from)?;
+    let fields = |fields: BTreeMap<String, TwoNumbers>| fields.into_iter().map(|(k, v)| (k, v.0)).collect();
+    Ok(read.into_iter().map(|(tag, of)| (tag, fields(of))).collect())
 }

@@ -18,6 +18,7 @@ pub fn tank(i: usize, area_cm2: f64, height_cm: f64) -> TankSpec {
         height_cm,
         initial_cm: 0.0,
         spills_to: None,
+        spill_share: 1.0,
         at: None,
         width: None,
     }
