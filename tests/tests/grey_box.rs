@@ -123,8 +123,11 @@ fn the_simulation_is_that_of_the_plant() {
     }
 }
 
-/// Free parameters of every kind, with the tanks whose levels are recorded.
-fn of_every_kind() -> Vec<(&'static str, usize, Vec<usize>, Vec<(&'static str, [f64; 2])>)> {
+/// Preset, configuration, tanks whose levels are recorded, free parameters with their bounds.
+type Freed = (&'static str, usize, Vec<usize>, Vec<(&'static str, [f64; 2])>);
+
+/// Free parameters of every kind.
+fn of_every_kind() -> Vec<Freed> {
     vec![
         (
             "stad",

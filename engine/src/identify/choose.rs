@@ -46,8 +46,8 @@ impl Choice {
 ///
 /// The criterion counts independent rows only, n = N/(1 + 2 Σ ρ) of the best fit's residuals: rows that repeat each
 /// other's noise would otherwise speak for ever more parameters. A structure without an interval for all its
-/// parameters, with a second time constant or a zero whose interval holds 0, or with a time constant beyond twice the
-/// stretch, comes after those without such a flaw.
+/// parameters, with a second time constant smaller than its standard error, a zero whose interval holds 0, or a time
+/// constant beyond twice the stretch, comes after those without such a flaw.
 ///
 /// # Errors
 /// [`FitError`] as [`super::fit_model`], where no structure can be fitted.
@@ -104,6 +104,7 @@ fn is_flawed(fit: &ModelFit, span_s: f64) -> bool {
     let unknown = fit.parameters.iter().any(|p| !p.standard_error.is_finite());
     let nothing =
         |name: &str| fit.parameter(name).is_some_and(|p| p.interval_95[0] <= 0.0 && p.interval_95[1] >= 0.0);
+    let scattered = fit.parameter("T2_s").is_some_and(|p| p.standard_error > p.value);
     let long = fit.parameter("T_s").is_some_and(|t| t.value > 2.0 * span_s);
-    unknown || nothing("T2_s") || nothing("Tz_s") || long
+    unknown || scattered || nothing("T2_s") || nothing("Tz_s") || long
 }

@@ -58,6 +58,7 @@ pub fn valve(id: &str, from: usize, to: Option<usize>, k90: f64) -> ValveSpec {
 
 pub fn rig(tanks: Vec<TankSpec>, pumps: Vec<PumpSpec>, valves: Vec<ValveSpec>, delta_cm: f64) -> Network {
     let spec = RigSpec {
+        fit: Default::default(),
         schema: 1,
         id: "random".to_owned(),
         title: Text::One("random".to_owned()),
