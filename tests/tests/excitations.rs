@@ -14,8 +14,10 @@ use vasos_engine::model::ProcessModel;
 use vasos_engine::plant::{Fault, Measurement, Network, Plant, Reading, ReadingStatus, RigError};
 use vasos_engine::session::{CommandError, EventKind, Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::sim::{ClosedLoop, run_excitation};
-use vasos_io::rig::{load_scenario, parse_rig, preset, write_run_csv};
-use vasos_tests::{TAG, begin, checked_step, excite, relay_test, tag, tested_rig, to_its_end};
+use vasos_io::rig::{load_scenario, preset, write_run_csv};
+use vasos_tests::{
+    CASCADE, TAG, begin, checked_step, excite, relay_test, tag, tested_rig, three_tanks, to_its_end,
+};
 
 fn rig(measurement: Measurement) -> Rig {
     Rig { network: preset("stad").expect("preset"), configuration: 0, measurement, seed: 3 }
@@ -141,28 +143,7 @@ fn a_live_source_is_tested_through_the_same_trait() {
 
 /// SimTank with three tanks, the level of the third over that of the first.
 fn cascade() -> ClosedLoop {
-    let text = vasos_io::rig::PRESETS.iter().find(|p| p.id == "simtank3").expect("preset").text;
-    let head = text.split("[[configuration.loop]]").next().expect("a head");
-    let loops = r#"
-[[configuration.loop]]
-id = "LIC-01"
-sensor = "LT01"
-pump = "BA01"
-setpoint_cm = 10.0
-mode = "cascade"
-kc = 20.0
-ti_s = 30.0
-
-[[configuration.loop]]
-id = "LIC-03"
-sensor = "LT03"
-cascade_to = "LIC-01"
-setpoint_cm = 2.0
-mode = "automatic"
-kc = 2.0
-ti_s = 120.0
-"#;
-    let network = parse_rig("loops.toml", &format!("{head}start_steady = true\n{loops}")).expect("a rig");
+    let network = three_tanks(CASCADE).expect("a rig");
     let mut closed = ClosedLoop::simulated(network, 0, Measurement::IDEAL, 1).expect("starts");
     for _ in 0..20 {
         closed.step();

@@ -8,34 +8,8 @@ use vasos_engine::document::{Consequence, Document, DocumentCommand, History, ri
 use vasos_engine::plant::{Measurement, Network, RigError};
 use vasos_engine::session::{CommandError, RigCommand};
 use vasos_engine::sim::{ClosedLoop, LoopTarget, Scenario, run_scenario};
-use vasos_io::rig::{FileError, parse_rig, preset};
-
-/// SimTank with three tanks and other loops.
-fn rig(loops: &str) -> Result<Arc<Network>, FileError> {
-    let text = vasos_io::rig::PRESETS.iter().find(|p| p.id == "simtank3").expect("preset").text;
-    let head = text.split("[[configuration.loop]]").next().expect("a head");
-    parse_rig("loops.toml", &format!("{head}start_steady = true\n{loops}"))
-}
-
-const CASCADE: &str = r#"
-[[configuration.loop]]
-id = "LIC-01"
-sensor = "LT01"
-pump = "BA01"
-setpoint_cm = 10.0
-mode = "cascade"
-kc = 20.0
-ti_s = 30.0
-
-[[configuration.loop]]
-id = "LIC-03"
-sensor = "LT03"
-cascade_to = "LIC-01"
-setpoint_cm = 2.0
-mode = "automatic"
-kc = 2.0
-ti_s = 120.0
-"#;
+use vasos_io::rig::preset;
+use vasos_tests::{CASCADE, three_tanks};
 
 fn closed(network: Arc<Network>) -> ClosedLoop {
     ClosedLoop::simulated(network, 0, Measurement::IDEAL, 1).expect("starts")
@@ -76,7 +50,7 @@ fn on_off_pid_and_manual_live_in_one_rig() {
 
 #[test]
 fn a_cascade_starts_at_rest_and_follows_its_outer_setpoint() {
-    let mut closed = closed(rig(CASCADE).expect("a rig"));
+    let mut closed = closed(three_tanks(CASCADE).expect("a rig"));
     let inner = &closed.loops()[0];
     assert_eq!((inner.target, inner.outer), (LoopTarget::Pump(0), Some(1)));
     assert_eq!((closed.loops()[1].target, closed.loops()[1].pump), (LoopTarget::Loop(0), 0));
@@ -98,7 +72,7 @@ fn a_cascade_starts_at_rest_and_follows_its_outer_setpoint() {
 
 #[test]
 fn leaving_and_entering_cascade_brings_no_jump() {
-    let mut closed = closed(rig(CASCADE).expect("a rig"));
+    let mut closed = closed(three_tanks(CASCADE).expect("a rig"));
     apply(&mut closed, RigCommand::Setpoint { tag: "LIC-03".to_owned(), level_cm: 3.0 });
     for _ in 0..100 {
         closed.step();
@@ -136,7 +110,7 @@ fn leaving_and_entering_cascade_brings_no_jump() {
 /// The outer loop must not lead the inner setpoint on where the pump cannot follow.
 #[test]
 fn an_outer_loop_holds_while_its_inner_loop_is_at_a_limit() {
-    let mut closed = closed(rig(CASCADE).expect("a rig"));
+    let mut closed = closed(three_tanks(CASCADE).expect("a rig"));
     let low = OutputLimits { high: Some(closed.loops()[0].control.mv() + 1.0), ..OutputLimits::default() };
     let options = Box::new(LoopOptions { output: low, ..LoopOptions::default() });
     apply(&mut closed, RigCommand::Options { tag: "LIC-01".to_owned(), options });
@@ -161,7 +135,7 @@ fn feed_forward_meets_a_disturbance_before_the_level_moves() {
             "[[configuration.loop]]\nid = \"LIC-02\"\nsensor = \"LT02\"\npump = \"BA02\"\n\
              setpoint_cm = 8.0\nmode = \"automatic\"\nkc = 5.0\nti_s = 100.0\n{feedforward}"
         );
-        let mut closed = closed(rig(&loops).expect("a rig"));
+        let mut closed = closed(three_tanks(&loops).expect("a rig"));
         closed.step();
         apply(&mut closed, RigCommand::Mv { tag: "BA03".to_owned(), value: 15.0 });
         let mut area = 0.0;
@@ -180,7 +154,7 @@ fn feed_forward_meets_a_disturbance_before_the_level_moves() {
 fn wrong_loops_are_refused_with_loop_field_and_value() {
     let change = |from: &str, to: &str| {
         assert!(CASCADE.contains(from), "{from}");
-        rig(&CASCADE.replacen(from, to, 1)).expect_err(to).to_string()
+        three_tanks(&CASCADE.replacen(from, to, 1)).expect_err(to).to_string()
     };
     for (from, to, said) in [
         ("pump = \"BA01\"", "pump = \"BA01\"\ncascade_to = \"LIC-03\"", "LIC-01 must write one thing"),
@@ -229,7 +203,7 @@ fn wrong_loops_are_refused_with_loop_field_and_value() {
 
 #[test]
 fn a_running_loop_refuses_what_its_file_would() {
-    let mut closed = closed(rig(CASCADE).expect("a rig"));
+    let mut closed = closed(three_tanks(CASCADE).expect("a rig"));
     let tag = || "LIC-03".to_owned();
     let p = PidTuning::new(PidGains::p(2.0));
     assert!(closed.apply(&RigCommand::Tuning { tag: tag(), tuning: p }).is_err(), "PID-I2GL needs Ti");
@@ -245,7 +219,7 @@ fn a_running_loop_refuses_what_its_file_would() {
 /// Law and options travel with the document: to the rig, back by undo, and again after a reload.
 #[test]
 fn law_and_options_are_undone_and_reach_a_reloaded_rig() {
-    let network = rig(CASCADE).expect("a rig");
+    let network = three_tanks(CASCADE).expect("a rig");
     let mut history = History::new(Document::new(network.clone()));
     let tag = || "LIC-03".to_owned();
     let mut options = LoopOptions::default();
@@ -297,7 +271,7 @@ fn law_and_options_are_undone_and_reach_a_reloaded_rig() {
 /// The outer loop's figures begin at its setpoint step; the inner loop's setpoint moves all the time.
 #[test]
 fn figures_begin_at_the_last_setpoint_step() {
-    let network = rig(CASCADE).expect("a rig");
+    let network = three_tanks(CASCADE).expect("a rig");
     let text = "schema = 1\nrig = \"x\"\nduration_s = 3000.0\nmeasurement = { noise = false, quantisation = false, \
                 resolution = false }\n[[event]]\nat_s = 100.0\nsetpoint = { tag = \"LIC-03\", level_cm = 3.0 }\n";
     let scenario: Scenario = toml::from_str(text).expect("a scenario");
