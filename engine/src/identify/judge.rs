@@ -136,6 +136,7 @@ fn residuals(fit: &ModelFit, found: &mut Vec<FitVerdict>) {
             .iter()
             .copied()
             .enumerate()
+            .skip(1)
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
             .unwrap_or((0, 0.0));
         found.push(FitVerdict::ResidualsFollowInput { correlation, lag });

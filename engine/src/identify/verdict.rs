@@ -315,6 +315,8 @@ impl FitVerdict {
         match self {
             Self::NoExcitation { .. } | Self::Disturbed { .. } | Self::GainUnknown => true,
             Self::Poor { fit_percent } => *fit_percent < NOTHING_PERCENT,
+            // One or two steps of the sensor have no shape.
+            Self::ResolutionLimited { levels, .. } => *levels < 3.0,
             _ => false,
         }
     }

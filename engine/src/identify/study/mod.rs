@@ -255,7 +255,10 @@ fn refuse_feedback(
     const FEW_MOVES: usize = 5;
     /// Fit in percent from which a few moves of the setpoint do tell the process.
     const TOLD_PERCENT: f64 = 75.0;
-    let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK) else { return };
+    // What a few rows show, such as those ahead of a test, says nothing of the rest.
+    let rows = problem.time_s.len();
+    let throughout = |c: &&ControllerFit| 2 * c.rows * c.stride > rows;
+    let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK).filter(throughout) else { return };
     let still = record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]));
     let one_mode = record.mode.is_none_or(|mode| mode.iter().all(|m| *m == mode[0]));
     let other_excitation = problem.disturbances.iter().any(|d| d.values.iter().any(|v| *v != d.values[0]));
