@@ -117,7 +117,9 @@ fn range<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
 
 /// Residuals smaller than a step of a PV that moves by few of them.
 fn too_coarse(fit: &ModelFit, problem: &FitProblem) -> Option<FitVerdict> {
-    let step = resolution(problem.pv, 0.1)?;
+    let counts = |k: &usize| problem.keep.as_ref().is_none_or(|keep| keep[*k]);
+    let counted: Vec<f64> = (0..problem.pv.len()).filter(counts).map(|k| problem.pv[k]).collect();
+    let step = resolution(&counted, 0.1)?;
     let (low, high) = range(fit.simulated.iter());
     let levels = (high - low) / step;
     (fit.mse.sqrt() < 0.5 * step && levels < 20.0)

@@ -51,7 +51,8 @@ pub(super) fn condition(time_s: &[f64], pv: &[f64], mv: &[f64], first_row: usize
             value: pv[first],
         });
     }
-    if let Some(step) = resolution(pv, 0.02) {
+    let counted: Vec<f64> = pv.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(y, _)| *y).collect();
+    if let Some(step) = resolution(&counted, 0.02) {
         findings.push(RecordFinding::Quantised { step });
     }
     let slips = slips(mv);
