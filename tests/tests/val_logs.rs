@@ -82,11 +82,9 @@ fn study(folder: &Path, case: &Case) -> Result<(String, LoopStudy), String> {
     columns.extend(other.as_deref());
     let to_s = case.to_s.unwrap_or(f64::INFINITY);
     let rows = log.table.complete(&columns, 0.0, to_s);
-    let taken: Vec<usize> =
-        (0..log.table.len()).filter(|i| rows.left_out.binary_search(i).is_err()).collect();
     let beside = |role: &Option<String>| -> Option<Vec<f64>> {
         let values = column(role.as_deref()?).ok()?;
-        let values: Vec<f64> = taken.iter().map(|&i| values[i]).collect();
+        let values: Vec<f64> = rows.taken.iter().map(|&i| values[i]).collect();
         values.iter().all(|v| v.is_finite()).then_some(values)
     };
     let (sp, mode) = (beside(&roles.sp), beside(&roles.mode));

@@ -27,17 +27,28 @@ pub(super) fn dead_time_interval(
     }
     let variance = best.rss() / stretch.len().saturating_sub(stretch.unknowns()).max(1) as f64;
     // Signed root of the likelihood ratio, close to (L − L̂)/se.
-    let mut ratio = |dead_time_s: f64| {
+    let ratio = |dead_time_s: f64| {
         let point = refine_time_constant(stretch, best, dead_time_s, bounds, passes)?;
         Some(((point.rss() - best.rss()).max(0.0) / variance).sqrt())
     };
+    ends(found, student * standard_error_s, student, SECANTS, ratio)
+}
+
+/// Dead times either side of `found_s`, first tried `reach_s` away, at which `ratio` comes to `student`; cut at 0.
+///
+/// `ratio` is the signed root of the likelihood ratio at a dead time in seconds, `None` where there is no fit.
+pub(super) fn ends(
+    found_s: f64,
+    reach_s: f64,
+    student: f64,
+    secants: usize,
+    mut ratio: impl FnMut(f64) -> Option<f64>,
+) -> Option<Interval> {
     let mut end = |side: f64| -> Option<f64> {
-        let (mut inside, mut outside) = (found, None);
-        let mut at = found + side * student * standard_error_s;
-        for _ in 0..SECANTS {
-            if at <= 0.0 {
-                at = 0.0;
-            }
+        let (mut inside, mut outside) = (found_s, None);
+        let mut at = found_s + side * reach_s;
+        for _ in 0..secants {
+            at = at.max(0.0);
             let reached = ratio(at)?;
             if (reached - student).abs() < 0.01 * student || (at == 0.0 && reached < student) {
                 return Some(at);
@@ -49,7 +60,7 @@ pub(super) fn dead_time_interval(
             }
             at = match outside {
                 Some(outside) => 0.5 * (inside + outside),
-                None => found + (at - found) * (student / reached.max(0.2 * student)).min(2.0),
+                None => found_s + (at - found_s) * (student / reached.max(0.2 * student)).min(2.0),
             };
         }
         Some(at)

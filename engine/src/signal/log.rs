@@ -51,8 +51,30 @@ pub struct CompleteRows {
     pub time_s: Vec<f64>,
     /// The chosen columns, in the order asked for.
     pub columns: Vec<Vec<f64>>,
+    /// Rows taken, counted from 0.
+    pub taken: Vec<usize>,
     /// Rows left out because a value was missing, counted from 0.
     pub left_out: Vec<usize>,
+}
+
+impl CompleteRows {
+    /// Values of another column at the rows taken; a missing one holds the last, or the first there is. `None` where
+    /// there is none at all.
+    #[must_use]
+    pub fn held(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let mut last = self.taken.iter().map(|&row| values[row]).find(|v| v.is_finite());
+        let mut hold = |row: usize| {
+            last = Some(values[row]).filter(|v| v.is_finite()).or(last);
+            last
+        };
+        self.taken.iter().map(|&row| hold(row)).collect()
+    }
+
+    /// Line of the file that the first row came from, counted from 1.
+    #[must_use]
+    pub fn first_line(&self, table: &LogTable) -> usize {
+        self.taken.first().and_then(|&row| table.lines.get(row)).map_or(1, |line| *line as usize)
+    }
 }
 
 impl LogTable {
@@ -87,11 +109,13 @@ impl LogTable {
         let mut rows = CompleteRows {
             time_s: Vec::new(),
             columns: vec![Vec::new(); columns.len()],
+            taken: Vec::new(),
             left_out: Vec::new(),
         };
         for (row, &time) in self.time_s.iter().enumerate().filter(|(_, t)| (from_s..=to_s).contains(*t)) {
             if columns.iter().all(|c| c[row].is_finite()) {
                 rows.time_s.push(time);
+                rows.taken.push(row);
                 rows.columns.iter_mut().zip(columns).for_each(|(to, from)| to.push(from[row]));
             } else {
                 rows.left_out.push(row);

@@ -221,25 +221,11 @@ impl Stretch {
         let (from_s, to_s) = (arguments.from.unwrap_or(0.0), arguments.to.unwrap_or(f64::INFINITY));
         let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let rows = table.complete(&slices, from_s, to_s);
-        let inside = table.time_s.iter().enumerate().filter(|(_, t)| (from_s..=to_s).contains(*t));
-        let taken: Vec<usize> =
-            inside.map(|(row, _)| row).filter(|row| rows.left_out.binary_search(row).is_err()).collect();
         // A setpoint or mode that is missing here and there holds its last value.
         let held = |name: &Option<String>| -> Result<Option<Vec<f64>>, Refusal> {
             let Some(name) = name else { return Ok(None) };
-            let values = column(name)?;
-            let mut last = taken.iter().map(|&row| values[row]).find(|v| v.is_finite());
-            let filled = taken.iter().map(|&row| {
-                last = Some(values[row]).filter(|v| v.is_finite()).or(last);
-                last
-            });
-            Ok(filled.collect::<Option<Vec<f64>>>())
+            Ok(rows.held(&column(name)?))
         };
-        Ok(Self {
-            sp: held(&chosen.sp)?,
-            mode: held(&chosen.mode)?,
-            first_row: taken.first().and_then(|&row| table.lines.get(row)).map_or(1, |line| *line as usize),
-            rows,
-        })
+        Ok(Self { sp: held(&chosen.sp)?, mode: held(&chosen.mode)?, first_row: rows.first_line(table), rows })
     }
 }

@@ -8,7 +8,7 @@ use vasos_engine::identify::{
     Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, Structure, StudyOptions,
     reaction_curve, study_loop,
 };
-use vasos_engine::signal::{ChannelKind, LogColumn, LogTable};
+use vasos_engine::signal::{ChannelKind, LogTable};
 
 use crate::tr;
 use crate::traces::RunTrace;
@@ -86,11 +86,9 @@ fn of_log(log: &LogTable, roles: LogRoles, state: &State, stretch: Stretch) -> R
     let mut columns: Vec<&[f64]> = vec![&pv.values, &mv.values];
     columns.extend(other.map(|c| c.values.as_slice()));
     let rows = log.complete(&columns, stretch.from_s, stretch.to_s);
-    let taken: Vec<usize> = (0..log.len())
-        .filter(|&i| (stretch.from_s..=stretch.to_s).contains(&log.time_s[i]))
-        .filter(|i| rows.left_out.binary_search(i).is_err())
-        .collect();
-    let first_row = taken.first().and_then(|&i| log.lines.get(i)).map_or(1, |line| *line as usize);
+    let first_row = rows.first_line(log);
+    let beside = |role: Option<usize>| column(role).and_then(|c| rows.held(&c.values));
+    let (sp, mode) = (beside(roles.sp), beside(roles.mode));
     let mut values = rows.columns.into_iter();
     let (pv_values, mv_values) = (values.next().unwrap_or_default(), values.next().unwrap_or_default());
     let stretch = Stretch {
@@ -110,25 +108,13 @@ fn of_log(log: &LogTable, roles: LogRoles, state: &State, stretch: Stretch) -> R
         time_s: rows.time_s,
         pv: pv_values,
         mv: mv_values,
-        sp: column(roles.sp).and_then(|c| held(c, &taken)),
-        mode: column(roles.mode).and_then(|c| held(c, &taken)),
+        sp,
+        mode,
         disturbance: other.map(|c| c.name.clone()).zip(values.next()),
         origin: ModelOrigin::Log { name: log.name.clone(), stretch },
         pv_unit: pv.unit.clone().unwrap_or_default(),
         mv_unit: mv.unit.clone().unwrap_or_default(),
     })
-}
-
-/// A column at some rows; a missing value holds the last one.
-fn held(column: &LogColumn, taken: &[usize]) -> Option<Vec<f64>> {
-    let mut last = taken.iter().map(|&i| column.values[i]).find(|v| v.is_finite());
-    taken
-        .iter()
-        .map(|&i| {
-            last = Some(column.values[i]).filter(|v| v.is_finite()).or(last);
-            last
-        })
-        .collect()
 }
 
 fn of_run(

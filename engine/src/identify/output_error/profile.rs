@@ -9,6 +9,7 @@ use super::descend::{Found, refine_holding};
 use super::shape::{Order, Shape};
 use crate::identify::fopdt::Interval;
 use crate::identify::problem::Stretch;
+use crate::identify::profile::ends;
 
 /// Rows above which the passes would be felt, and where kinks ask for more of them.
 const MANY_ROWS: usize = 20_000;
@@ -59,32 +60,11 @@ pub(in crate::identify) fn dead_time_interval(
     let unknown = shape.first_unknown(channel) + shape.channels[channel].unknowns() - 1;
     let found_s = best.points[channel].dead_time_s;
     // Signed root of the likelihood ratio, close to (L − L̂)/se.
-    let mut ratio = |dead_time_s: f64| {
+    let ratio = |dead_time_s: f64| {
         let mut points = best.points.clone();
         points[channel].dead_time_s = dead_time_s;
         let at = refine_holding(stretch, shape, &points, PASSES, Some(unknown), passes)?;
         Some(((at.rss() - best.rss()).max(0.0) / variance).sqrt())
     };
-    let mut end = |side: f64| -> Option<f64> {
-        let (mut inside, mut outside) = (found_s, None);
-        let mut at = found_s + side * student * standard_error_s;
-        for _ in 0..SECANTS {
-            at = at.max(0.0);
-            let reached = ratio(at)?;
-            if (reached - student).abs() < 0.01 * student || (at == 0.0 && reached < student) {
-                return Some(at);
-            }
-            if reached < student {
-                inside = at;
-            } else {
-                outside = Some(at);
-            }
-            at = match outside {
-                Some(outside) => 0.5 * (inside + outside),
-                None => found_s + (at - found_s) * (student / reached.max(0.2 * student)).min(2.0),
-            };
-        }
-        Some(at)
-    };
-    Some([end(-1.0)?, end(1.0)?])
+    ends(found_s, student * standard_error_s, student, SECANTS, ratio)
 }
