@@ -15,7 +15,6 @@ pub(super) fn of(
     as_json: bool,
     chosen: &Chosen,
     study: &LoopStudy,
-    curve: Option<&ReactionCurve>,
     log: &ImportedLog,
     mut warnings: Vec<String>,
 ) -> Answer {
@@ -32,24 +31,18 @@ pub(super) fn of(
     };
     let status = u8::from(!usable);
     if as_json {
-        let text = json::text(&whole(chosen, study, curve, &repairs, &warnings));
+        let text = json::text(&whole(chosen, study, &repairs, &warnings));
         return Answer { text, remarks, status };
     }
     let mut text = text(chosen, study);
-    text.push_str(&curve.map_or_else(String::new, curve_text));
+    text.push_str(&study.reaction_curve.as_ref().map_or_else(|_| String::new(), curve_text));
     for line in warnings.iter().chain(&repairs) {
         text.push_str(&format!("note: {line}\n"));
     }
     Answer { text, remarks, status }
 }
 
-fn whole(
-    chosen: &Chosen,
-    study: &LoopStudy,
-    curve: Option<&ReactionCurve>,
-    repairs: &[String],
-    warnings: &[String],
-) -> Value {
+fn whole(chosen: &Chosen, study: &LoopStudy, repairs: &[String], warnings: &[String]) -> Value {
     let models: Vec<Value> = study.choice.iter().flat_map(|c| &c.fits).map(model).collect();
     let structure = |fit: &ModelFit| fit.structure.key();
     let choice = study.choice.as_ref().ok();
@@ -67,7 +60,7 @@ fn whole(
             "period_s": o.period_s, "regularity": o.regularity, "stiction_index": o.stiction_index,
             "stiction_band": o.stiction_band, "sticks": o.sticks(),
         })),
-        "reaction_curve": curve.map(|c| c.estimates.iter().map(|e| json!({
+        "reaction_curve": study.reaction_curve.as_ref().ok().map(|c| c.estimates.iter().map(|e| json!({
             "method": e.method.key(), "K": e.model.gain, "T_s": e.model.time_constant_s,
             "L_s": e.model.dead_time_s, "r2": e.r2,
         })).collect::<Vec<_>>()),

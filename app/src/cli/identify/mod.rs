@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use vasos_engine::identify::{
     Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModelFit, Structure, StudyOptions,
-    reaction_curve, study_loop,
+    study_loop,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
 use vasos_io::log::{ImportOptions, ImportedLog, import_log};
@@ -118,7 +118,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     problem.options = fit_options;
     let others = chosen.disturbances.iter().zip(&rows.columns[2..]);
     problem.disturbances = others.map(|(name, values)| Disturbance { name: name.clone(), values }).collect();
-    let curve = reaction_curve(&problem);
     let record = LoopRecord { problem, sp: stretch.sp.as_deref(), mode: stretch.mode.as_deref() };
     let study = study_loop(&record, &options).map_err(Refusal::of)?;
     if let Err(error) = &study.choice
@@ -130,12 +129,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     if !rows.left_out.is_empty() {
         warnings.push(format!("{} rows without a value were left out", rows.left_out.len()));
     }
-    if let Err(error) = &curve
+    if let Err(error) = &study.reaction_curve
         && error.is_one_step()
     {
         warnings.push(format!("no reaction curve: {error}"));
     }
-    Ok(answer::of(arguments.json, &chosen, &study, curve.ok().as_ref(), &log, warnings))
+    Ok(answer::of(arguments.json, &chosen, &study, &log, warnings))
 }
 
 fn study_options(arguments: &Arguments) -> Result<StudyOptions, Refusal> {

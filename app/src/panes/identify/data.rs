@@ -175,7 +175,7 @@ pub fn of_report(report: &ExcitationReport, mv_unit: String) -> Outcome {
     let record = &report.record;
     let end = |at: Option<&f64>| at.copied().unwrap_or(report.start_s);
     let stretch = Stretch { from_s: end(record.time_s.first()), to_s: end(record.time_s.last()) };
-    let reaction_curve = reaction_curve(&FitProblem::new(&record.time_s, &record.pv, &record.mv)).ok();
+    let reaction_curve = reaction_curve(&FitProblem::new(&record.time_s, &record.pv, &record.mv));
     let choice = Ok(told.choice);
     let study = LoopStudy { choice, controller: None, oscillation: None, reaction_curve, findings: vec![] };
     Outcome::Model(Box::new(NewModel {

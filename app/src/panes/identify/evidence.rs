@@ -62,7 +62,7 @@ fn pictures(
     picture: &mut Picture,
     actions: &mut Vec<Action>,
 ) {
-    let curve = entry.study.as_ref().and_then(|study| study.reaction_curve.as_ref());
+    let curve = entry.study.as_ref().and_then(|study| study.reaction_curve.as_ref().ok());
     let mut pictures = vec![
         (Picture::Data, tr!("identify.data")),
         (Picture::Residuals, tr!("identify.residuals")),

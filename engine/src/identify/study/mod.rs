@@ -17,8 +17,8 @@ pub use finding::RecordFinding;
 pub use stiction::Oscillation;
 
 use super::{
-    Choice, FitError, FitProblem, FitVerdict, ReactionCurve, Structure, choose_among, choose_from_rest,
-    reaction_curve,
+    Choice, FitError, FitProblem, FitVerdict, ReactionCurve, ReactionCurveError, Structure, choose_among,
+    choose_from_rest, reaction_curve,
 };
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
@@ -55,8 +55,8 @@ pub struct LoopStudy {
     pub controller: Option<ControllerFit>,
     /// Regular oscillation, where there is one.
     pub oscillation: Option<Oscillation>,
-    /// Estimates of the reaction curve, where the stretch is one step between two rests.
-    pub reaction_curve: Option<ReactionCurve>,
+    /// Estimates of the reaction curve where the stretch is one step between two rests, or why there are none.
+    pub reaction_curve: Result<ReactionCurve, ReactionCurveError>,
     /// What else was seen.
     pub findings: Vec<RecordFinding>,
 }
@@ -129,7 +129,7 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
         of_the_loop(controller, choice, &mut findings);
     }
     let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
-    let reaction_curve = reaction_curve(&problem).ok();
+    let reaction_curve = reaction_curve(&problem);
     Ok(LoopStudy { choice, controller, oscillation, reaction_curve, findings })
 }
 
