@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use vasos_app::cli::parse::ParseError;
-use vasos_engine::analyze::MetricsError;
+use vasos_engine::analyze::{FrequencyResponseError, MetricsError};
 use vasos_engine::control::{FormError, GainsError};
 use vasos_engine::document::DocumentError;
 use vasos_engine::excitation::{ExcitationError, ExcitationWarning, StopReason};
@@ -18,6 +18,7 @@ use vasos_engine::plant::{LinearError, RigError};
 use vasos_engine::session::{Alarm, CommandError};
 use vasos_engine::signal::ExpressionError;
 use vasos_engine::sim::{CompareError, ScenarioError};
+use vasos_engine::tune::optimum::OptimumError;
 use vasos_engine::tune::{RuleError, RuleWarning, registry};
 use vasos_io::log::{ImportError, Repair};
 use vasos_io::recording::{RecordingError, RecordingTrouble};
@@ -217,6 +218,8 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("RunError", vec![Box::new(RunError::Rig(RigError::NoTank))]),
         ("GainsError", boxed(GainsError::samples())),
         ("FormError", boxed(FormError::samples())),
+        ("FrequencyResponseError", boxed(FrequencyResponseError::samples())),
+        ("OptimumError", boxed(OptimumError::samples())),
         ("ModelError", boxed(ModelError::samples())),
         ("CommandError", boxed(CommandError::samples())),
         ("ExcitationError", boxed(ExcitationError::samples())),

@@ -94,11 +94,54 @@ pub fn analyze_loop(open: &OpenLoop) -> Analysis {
     }
 }
 
+/// Whether a loop is stable, see [`is_closed_loop_stable`].
+#[must_use]
+pub fn is_loop_stable(open: &OpenLoop) -> bool {
+    is_stable(open, &gain_crossings(open))
+}
+
 /// Whether the closed loop is stable: the verdict of [`analyze`] alone, a few hundred nanoseconds.
 #[must_use]
 pub fn is_closed_loop_stable(model: &ProcessModel, gains: &PidGains) -> bool {
-    let open = OpenLoop::new(model, gains);
-    is_stable(&open, &gain_crossings(&open))
+    is_loop_stable(&OpenLoop::new(model, gains))
+}
+
+/// The largest value of a function of the loop over all frequencies, and where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// The value; ∞ where there is no bound.
+    pub value: f64,
+    /// Its frequency in rad/s; 0 and ∞ for the limits.
+    pub omega_rad_s: f64,
+}
+
+/// Peaks of |S|, |T|, |G S/s| and |C S|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peaks {
+    /// Of |S|: Ms.
+    pub s: Peak,
+    /// Of |T|: Mt.
+    pub t: Peak,
+    /// Of |G S/s|: Jv.
+    pub v: Peak,
+    /// Of |C S|: Ju.
+    pub u: Peak,
+}
+
+/// The four peaks with their frequencies to the precision of [`analyze`]; `None` for an unstable loop.
+#[must_use]
+pub fn peaks(open: &OpenLoop) -> Option<Peaks> {
+    let crossings = gain_crossings(open);
+    if !is_stable(open, &crossings) {
+        return None;
+    }
+    let mut sweep = Sweep::new(open);
+    sweep.run(&Grid::new(open, &crossings));
+    let [s, t, v, u] = std::array::from_fn(|k| Peak {
+        value: 1.0 / sweep.lowest[k].sqrt(),
+        omega_rad_s: sweep.lowest_at[k],
+    });
+    Some(Peaks { s, t, v, u })
 }
 
 /// Unit crossing nearest to −1 as (ω, angle in radians), and the smallest delay over all of them.

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::OpenLoop;
+use crate::control::ParallelGains;
 use crate::model::realization::{Hermite, Realization, Step};
 
 /// What acts on the loop from t = 0: setpoint r with its weights b and c, and a load at the process input.
@@ -49,12 +50,9 @@ impl Stepper {
     }
 }
 
-/// u = Kc [(b r − y) + xᵢ/Ti + N ((c r − y) − x_f)], ẋᵢ = r − y, ẋ_f = ((c r − y) − x_f)/Tf.
+/// u = Kp (b r − y) + Ki xᵢ + (Kd/Tf) ((c r − y) − x_f), ẋᵢ = r − y, ẋ_f = ((c r − y) − x_f)/Tf.
 struct Controller {
-    kc: f64,
-    inverse_ti: f64,
-    n: f64,
-    filter_s: f64,
+    gains: ParallelGains,
     inputs: Inputs,
     integral: f64,
     filtered: DVector<f64>,
@@ -63,23 +61,24 @@ struct Controller {
 
 impl Controller {
     fn new(open: &OpenLoop, inputs: Inputs, h: f64) -> Self {
-        let (kc, inverse_ti, n, filter_s) = open.controller_terms();
-        let filter = (filter_s > 0.0)
-            .then(|| Step::new(&DMatrix::from_element(1, 1, -1.0 / filter_s), 1.0 / filter_s, h));
-        Self { kc, inverse_ti, n, filter_s, inputs, integral: 0.0, filtered: DVector::zeros(1), filter }
+        let gains = *open.gains();
+        let rate = 1.0 / gains.tf_s;
+        let filter = (gains.tf_s > 0.0).then(|| Step::new(&DMatrix::from_element(1, 1, -rate), rate, h));
+        Self { gains, inputs, integral: 0.0, filtered: DVector::zeros(1), filter }
     }
 
     /// u and its slope for the present state, y and ẏ.
     fn output(&self, y: f64, y_slope: f64) -> (f64, f64) {
         let Inputs { r, b, c, .. } = self.inputs;
-        let mut u = (b * r - y) + self.integral * self.inverse_ti;
-        let mut slope = -y_slope + (r - y) * self.inverse_ti;
-        if self.filter_s > 0.0 {
+        let ParallelGains { kp, ki, kd, tf_s } = self.gains;
+        let mut u = kp * (b * r - y) + ki * self.integral;
+        let mut slope = ki * (r - y) - kp * y_slope;
+        if tf_s > 0.0 {
             let remainder = (c * r - y) - self.filtered[0];
-            u += self.n * remainder;
-            slope -= self.n * (y_slope + remainder / self.filter_s);
+            u += kd / tf_s * remainder;
+            slope -= kd / tf_s * (y_slope + remainder / tf_s);
         }
-        (self.kc * u, self.kc * slope)
+        (u, slope)
     }
 
     fn advance(&mut self, y: Hermite, h: f64) {
@@ -159,16 +158,17 @@ pub(super) struct Direct {
 impl Direct {
     fn new(open: &OpenLoop, inputs: Inputs, h: f64) -> Self {
         let realization = Realization::new(&open.process_num, &open.process_den);
-        let (kc, inverse_ti, n, filter_s) = open.controller_terms();
+        let ParallelGains { kp, ki, kd, tf_s } = *open.gains();
+        let high = if tf_s > 0.0 { kd / tf_s } else { 0.0 };
         let order = realization.order();
         let size = order + 3;
         let (integral, filtered, one) = (order, order + 1, order + 2);
         // y = C x + D (u + load) and u = α − κ y solved for both: α collects all of u that is not y.
-        let kappa = kc * (1.0 + n);
+        let kappa = kp + high;
         let mut alpha = DVector::zeros(size);
-        alpha[integral] = kc * inverse_ti;
-        alpha[filtered] = -kc * n;
-        alpha[one] = kc * (inputs.b + n * inputs.c) * inputs.r;
+        alpha[integral] = ki;
+        alpha[filtered] = -high;
+        alpha[one] = (kp * inputs.b + high * inputs.c) * inputs.r;
         let mut y_row = &alpha * realization.d;
         y_row[one] += realization.d * inputs.load;
         for i in 0..order {
@@ -184,9 +184,9 @@ impl Direct {
                 system[(order - 1, j)] += u_row[j] + own * inputs.load;
             }
             system[(integral, j)] = own * inputs.r - y_row[j];
-            if filter_s > 0.0 {
+            if tf_s > 0.0 {
                 let old = if j == filtered { 1.0 } else { 0.0 };
-                system[(filtered, j)] = (own * inputs.c * inputs.r - y_row[j] - old) / filter_s;
+                system[(filtered, j)] = (own * inputs.c * inputs.r - y_row[j] - old) / tf_s;
             }
         }
         let mut z = DVector::zeros(size);

@@ -87,6 +87,18 @@ impl Grid {
     }
 }
 
+/// Moduli of poles and zeros, 1/θ and π/θ in rad/s, rising; at least one.
+pub(crate) fn natural_frequencies(open: &OpenLoop) -> Vec<f64> {
+    features(open, &[])
+}
+
+/// Frequencies in rad/s across the width of every lightly damped pole and zero.
+pub(crate) fn resonances(open: &OpenLoop) -> Vec<f64> {
+    let mut omegas = Vec::new();
+    push_resonances(open, &mut omegas);
+    omegas
+}
+
 /// Adds points across the width of every lightly damped pole and zero.
 fn push_resonances(open: &OpenLoop, omegas: &mut Vec<f64>) -> bool {
     let before = omegas.len();

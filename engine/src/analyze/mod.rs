@@ -8,6 +8,7 @@ mod analysis;
 mod closed_loop;
 mod frequency;
 mod grid;
+mod measured;
 mod metrics;
 mod open_loop;
 mod response;
@@ -15,8 +16,16 @@ mod search;
 mod stability;
 mod sweep;
 
-pub use analysis::{Analysis, analyze, analyze_loop, is_closed_loop_stable};
+pub use analysis::{
+    Analysis, Peak, Peaks, analyze, analyze_loop, is_closed_loop_stable, is_loop_stable, peaks,
+};
 pub use frequency::{CurveOptions, LoopFunction, frequency_curve, frequency_range};
+pub(crate) use grid::{natural_frequencies, resonances};
+pub use measured::{FrequencyResponse, FrequencyResponseError, analyze_measured, measured_peaks};
 pub use metrics::{Excitation, Metrics, MetricsError, metrics, metrics_at_rest};
+pub(crate) use open_loop::Asymptote;
 pub use open_loop::OpenLoop;
-pub use response::{Response, ResponseEnd, ResponseOptions, StepFigures, step_figures, step_response};
+pub use response::{
+    Response, ResponseEnd, ResponseOptions, StepFigures, loop_figures, loop_response, step_figures,
+    step_response,
+};

@@ -3,20 +3,17 @@
 use num_complex::Complex64;
 
 use super::grid::features;
-use crate::control::PidGains;
+use crate::control::{ParallelGains, PidGains};
 use crate::model::ProcessModel;
 use crate::model::roots::{at_j_omega, product, push_roots};
 
-/// `L(s) = G(s) C(s)` with G's dead time exact and `C = Kc (1 + 1/(Ti s) + Td s/(1 + s Td/N))`.
+/// `L(s) = G(s) C(s)` with G's dead time exact and `C = Kp + Ki/s + Kd s/(1 + s Tf)`.
 ///
-/// Built once per pair of model and gains; evaluating it allocates nothing. Gains that are not finite make every
+/// Any controller of the ideal form is one of these; a pure integrator (Kp = 0) is one too. Built once per pair of model and gains; evaluating it allocates nothing. Gains that are not finite make every
 /// value NaN, which the stability test reads as unstable.
 #[derive(Debug, Clone)]
 pub struct OpenLoop {
-    kc: f64,
-    inverse_ti: f64,
-    td_s: f64,
-    filter_s: f64,
+    controller: ParallelGains,
     pub(super) process_num: Vec<f64>,
     pub(super) process_den: Vec<f64>,
     pub(super) dead_time_s: f64,
@@ -27,7 +24,7 @@ pub struct OpenLoop {
 }
 
 /// First term of a function of s at one end of the imaginary axis: `coefficient · s^power`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Asymptote {
     pub coefficient: f64,
     pub power: i32,
@@ -46,23 +43,29 @@ impl OpenLoop {
     /// Joins a model (K in PV units per MV unit) and gains (Kc in MV units per PV unit).
     #[must_use]
     pub fn new(model: &ProcessModel, gains: &PidGains) -> Self {
-        let process = model.transfer_function();
-        let inverse_ti = if gains.ti_s.is_infinite() || gains.kc == 0.0 { 0.0 } else { 1.0 / gains.ti_s };
         let filter_s = if gains.td_s == 0.0 { 0.0 } else { gains.td_s / gains.n };
-        let (controller_num, controller_den) = controller(gains.kc, inverse_ti, gains.td_s, filter_s);
+        Self::of_parallel(
+            model,
+            &ParallelGains { kp: gains.kc, ki: gains.ki(), kd: gains.kd(), tf_s: filter_s },
+        )
+    }
+
+    /// Joins a model and gains of the parallel form; without derivative action Tf does not matter.
+    #[must_use]
+    pub fn of_parallel(model: &ProcessModel, gains: &ParallelGains) -> Self {
+        let process = model.transfer_function();
+        let controller = if gains.kd == 0.0 { ParallelGains { tf_s: 0.0, ..*gains } } else { *gains };
+        let (controller_num, controller_den) = polynomials(&controller);
         let degree = process.den.len() + controller_den.len();
         let (mut zeros, mut poles) = (Vec::with_capacity(degree), Vec::with_capacity(degree));
         push_roots(&process.num, &mut zeros);
         push_roots(&process.den, &mut poles);
-        if gains.kc != 0.0 {
+        if controller_num[0] != 0.0 {
             push_roots(&controller_num, &mut zeros);
         }
         push_roots(&controller_den, &mut poles);
         Self {
-            kc: gains.kc,
-            inverse_ti,
-            td_s: gains.td_s,
-            filter_s,
+            controller,
             num: product(&process.num, &controller_num),
             den: product(&process.den, &controller_den),
             process_num: process.num,
@@ -91,12 +94,10 @@ impl OpenLoop {
     /// `C(jω)`, ω > 0 in rad/s.
     #[must_use]
     pub fn controller_at_omega(&self, omega_rad_s: f64) -> Complex64 {
-        let filter = omega_rad_s * self.filter_s;
-        let derivative = omega_rad_s * self.td_s / (1.0 + filter * filter);
-        Complex64::new(
-            self.kc * (1.0 + derivative * filter),
-            self.kc * (derivative - self.inverse_ti / omega_rad_s),
-        )
+        let ParallelGains { kp, ki, kd, tf_s } = self.controller;
+        let filter = omega_rad_s * tf_s;
+        let derivative = omega_rad_s * kd / (1.0 + filter * filter);
+        Complex64::new(kp + derivative * filter, derivative - ki / omega_rad_s)
     }
 
     #[inline]
@@ -133,10 +134,10 @@ impl OpenLoop {
         (g_sqr * c_sqr, g_sqr, c_sqr)
     }
 
-    /// Kc, 1/Ti in 1/s, N of the filter (0 without derivative) and the filter's time constant Td/N in seconds.
-    pub(super) fn controller_terms(&self) -> (f64, f64, f64, f64) {
-        let n = if self.filter_s > 0.0 { self.td_s / self.filter_s } else { 0.0 };
-        (self.kc, self.inverse_ti, n, self.filter_s)
+    /// The controller's gains.
+    #[must_use]
+    pub fn gains(&self) -> &ParallelGains {
+        &self.controller
     }
 
     /// The lowest of the loop's own frequencies in rad/s: poles, zeros and 1/θ.
@@ -150,20 +151,21 @@ impl OpenLoop {
     }
 
     pub(super) fn controller_low(&self) -> Asymptote {
-        if self.inverse_ti == 0.0 {
-            Asymptote { coefficient: self.kc, power: 0 }
+        if self.controller.ki == 0.0 {
+            Asymptote { coefficient: self.controller.kp, power: 0 }
         } else {
-            Asymptote { coefficient: self.kc * self.inverse_ti, power: -1 }
+            Asymptote { coefficient: self.controller.ki, power: -1 }
         }
     }
 
-    /// C(∞): Kc, or Kc (1 + N) with derivative action.
+    /// C(∞): Kp, with derivative action Kp + Kd/Tf.
     pub(super) fn controller_high(&self) -> f64 {
-        self.kc * (1.0 + self.controller_terms().2)
+        let ParallelGains { kp, kd, tf_s, .. } = self.controller;
+        if kd == 0.0 { kp } else { kp + kd / tf_s }
     }
 
     /// G(∞) without its dead time: not zero only for as many zeros as poles.
-    pub(super) fn process_high(&self) -> f64 {
+    pub(crate) fn process_high(&self) -> f64 {
         if self.process_num.len() == self.process_den.len() {
             self.process_num[0] / self.process_den[0]
         } else {
@@ -182,15 +184,14 @@ fn low_asymptote(num: &[f64], den: &[f64]) -> Asymptote {
 }
 
 /// Numerator and denominator of C in falling powers of s.
-fn controller(kc: f64, inverse_ti: f64, td: f64, filter: f64) -> (Vec<f64>, Vec<f64>) {
-    match (inverse_ti != 0.0, td != 0.0) {
-        (false, false) => (vec![kc], vec![1.0]),
-        (false, true) => (vec![kc * (filter + td), kc], vec![filter, 1.0]),
-        (true, false) => (vec![kc, kc * inverse_ti], vec![1.0, 0.0]),
-        (true, true) => (
-            vec![kc * (filter + td), kc * (1.0 + filter * inverse_ti), kc * inverse_ti],
-            vec![filter, 1.0, 0.0],
-        ),
+fn polynomials(gains: &ParallelGains) -> (Vec<f64>, Vec<f64>) {
+    let ParallelGains { kp, ki, kd, tf_s } = *gains;
+    match (ki != 0.0, kd != 0.0) {
+        (false, false) => (vec![kp], vec![1.0]),
+        (false, true) => (vec![kp * tf_s + kd, kp], vec![tf_s, 1.0]),
+        (true, false) if kp == 0.0 => (vec![ki], vec![1.0, 0.0]),
+        (true, false) => (vec![kp, ki], vec![1.0, 0.0]),
+        (true, true) => (vec![kp * tf_s + kd, kp + ki * tf_s, ki], vec![tf_s, 1.0, 0.0]),
     }
 }
 

@@ -104,17 +104,22 @@ pub fn step_response(
     excitation: Excitation,
     options: &ResponseOptions,
 ) -> Response {
-    let open = OpenLoop::new(model, gains);
-    let crossings = gain_crossings(&open);
-    let stable = is_stable(&open, &crossings);
+    loop_response(&OpenLoop::new(model, gains), excitation, options)
+}
+
+/// [`step_response`] of a loop that is already built.
+#[must_use]
+pub fn loop_response(open: &OpenLoop, excitation: Excitation, options: &ResponseOptions) -> Response {
+    let crossings = gain_crossings(open);
+    let stable = is_stable(open, &crossings);
     let inputs = match excitation {
         Excitation::Setpoint => {
             Inputs { r: 1.0, b: options.setpoint_weight_b, c: options.setpoint_weight_c, load: 0.0 }
         }
         Excitation::Load => Inputs { r: 0.0, b: 1.0, c: 0.0, load: 1.0 },
     };
-    let goal = final_value(&open, inputs);
-    let last_crossing = crossings.last().map_or_else(|| typical_omega(&open), |c| c.omega);
+    let goal = final_value(open, inputs);
+    let last_crossing = crossings.last().map_or_else(|| typical_omega(open), |c| c.omega);
     let unstable_length = UNSTABLE_LENGTH
         * (crossings.first().map_or(1.0 / last_crossing, |c| 1.0 / c.omega)).max(open.dead_time_s);
     let run = Run {
@@ -133,11 +138,11 @@ pub fn step_response(
         let h = (CROSSING_STEP_RAD / last_crossing)
             .min(POLE_STEP_RAD / fastest_pole)
             .min((open.dead_time_s / STEPS_PER_DEAD_TIME).max(UNSEEN_PHASE_RAD / moving));
-        return run.through(Stepper::new(&open, inputs, h), MOST_STEPS);
+        return run.through(Stepper::new(open, inputs, h), MOST_STEPS);
     }
     let mut h = CROSSING_STEP_RAD / last_crossing;
     loop {
-        let response = run.through(Stepper::new(&open, inputs, h), STEPS_BEFORE_COARSER);
+        let response = run.through(Stepper::new(open, inputs, h), STEPS_BEFORE_COARSER);
         let complete = response.end != ResponseEnd::Horizon
             || run.horizon_s.is_some_and(|t| h * STEPS_BEFORE_COARSER as f64 >= t);
         if complete || h * last_crossing > f64::from(u16::MAX) {
@@ -249,12 +254,18 @@ pub struct StepFigures {
 /// [`StepFigures`] of a loop; all `None` when `analysis` calls it unstable, an IAE also where it is infinite.
 #[must_use]
 pub fn step_figures(model: &ProcessModel, gains: &PidGains, analysis: &Analysis) -> StepFigures {
+    loop_figures(&OpenLoop::new(model, gains), analysis)
+}
+
+/// [`step_figures`] of a loop that is already built.
+#[must_use]
+pub fn loop_figures(open: &OpenLoop, analysis: &Analysis) -> StepFigures {
     if !analysis.stable {
         return StepFigures::default();
     }
     let options = ResponseOptions::default();
     let figures = |excitation| {
-        let response = step_response(model, gains, excitation, &options);
+        let response = loop_response(open, excitation, &options);
         let settled = response.end == ResponseEnd::Settled;
         response.metrics().ok().filter(|_| settled)
     };

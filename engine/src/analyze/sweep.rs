@@ -43,6 +43,8 @@ pub(super) struct Sweep<'a> {
     open: &'a OpenLoop,
     /// Smallest reciprocal squares, limits at ω → 0 and ω → ∞ included.
     pub lowest: Reciprocals,
+    /// Their frequencies in rad/s; 0 and ∞ for the limits.
+    pub lowest_at: [f64; 4],
     /// Crossing with the largest |L| < 1: the first that a higher gain moves onto −1.
     pub above: Option<PhaseCrossing>,
     /// Crossing with the smallest |L| > 1: the first that a lower gain moves onto −1.
@@ -62,10 +64,13 @@ impl<'a> Sweep<'a> {
             let limit: f64 = at_zero[k].max(at_infinity[k]);
             1.0 / (limit * limit)
         });
+        let lowest_at =
+            std::array::from_fn(|k| if at_zero[k] >= at_infinity[k] { 0.0 } else { f64::INFINITY });
         let half_power = 2.0 / (at_zero[T] * at_zero[T]);
         let mut sweep = Self {
             open,
             lowest,
+            lowest_at,
             above: None,
             below: None,
             bandwidth: None,
@@ -128,8 +133,10 @@ impl<'a> Sweep<'a> {
             return;
         }
         let open = self.open;
-        let (_, low) = minimum(|omega| reciprocals(omega, &open.point(omega))[k], a, m, b);
-        self.lowest[k] = self.lowest[k].min(low);
+        let (omega, low) = minimum(|omega| reciprocals(omega, &open.point(omega))[k], a, m, b);
+        if low < self.lowest[k] {
+            (self.lowest[k], self.lowest_at[k]) = (low, omega);
+        }
     }
 
     fn cross(&mut self, a: &Seen, b: &Seen) {

@@ -34,6 +34,15 @@ pub struct ParallelGains {
     pub tf_s: f64,
 }
 
+impl ParallelGains {
+    /// C(jω), ω > 0 in rad/s.
+    #[must_use]
+    pub fn at_omega(&self, omega_rad_s: f64) -> Complex64 {
+        let s = Complex64::new(0.0, omega_rad_s);
+        self.kp + self.ki / s + self.kd * s / (1.0 + s * self.tf_s)
+    }
+}
+
 /// Gains of the series (interacting) form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -240,7 +249,7 @@ impl FormGains {
         let s = Complex64::new(0.0, omega_rad_s);
         match self {
             Self::Ideal(gains) => gains.at_omega(omega_rad_s),
-            Self::Parallel(g) => g.kp + g.ki / s + g.kd * s / (1.0 + s * g.tf_s),
+            Self::Parallel(g) => g.at_omega(omega_rad_s),
             Self::Series(g) => {
                 let integral = if g.ti_s.is_finite() { 1.0 / (s * g.ti_s) } else { Complex64::new(0.0, 0.0) };
                 g.kc * (1.0 + integral) * (1.0 + s * g.td_s) / (1.0 + s * g.td_s / g.n)

@@ -9,6 +9,7 @@ mod detune;
 mod error;
 mod formulas;
 mod kind;
+pub mod optimum;
 mod registry;
 mod rule;
 mod shape;

@@ -1,0 +1,427 @@
+//! A frequency response measured point by point, and the loop it makes with a controller.
+//!
+//! Between the points ln |G| and the phase run straight over ln ω. Below the first point G keeps the slope it starts
+//! with, constant or 1/ω, and its phase runs to the value that belongs to it in proportion to ω, as a dead time's
+//! does. Above the last nothing is known: peaks are sought up to there, and a loop whose gain has not fallen under 1 by
+//! then gets no verdict. The process is taken for stable, but for an integrator.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use num_complex::Complex64;
+
+use super::analysis::{Analysis, Peak, Peaks};
+use super::open_loop::Asymptote;
+use super::search::{minimum, root};
+use super::stability::angle_to_critical;
+use crate::control::ParallelGains;
+use crate::explain::{Explain, number};
+
+/// Fewest points of a response.
+const FEWEST: usize = 3;
+/// Points of the search between two measured ones.
+const BETWEEN: usize = 12;
+/// Decades below the first point that the search looks at; below them the limits rule.
+const DECADES_BELOW: f64 = 3.0;
+/// Slope of ln |G| over ln ω between the first two points under which a process integrates.
+const INTEGRATES: f64 = -0.6;
+
+/// Points (ω, G(jω)) of a process in rising frequency, to be read at any frequency up to the last.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrequencyResponse {
+    log_omega: Vec<f64>,
+    log_gain: Vec<f64>,
+    /// Without jumps of 2π.
+    phase_rad: Vec<f64>,
+    low: Asymptote,
+}
+
+/// Why points are not a frequency response.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrequencyResponseError {
+    /// Too few of them.
+    #[error("a frequency response of {count} points says too little: at least {FEWEST} are needed")]
+    TooFew {
+        /// Their number.
+        count: usize,
+    },
+    /// A frequency that is not larger than the one before, or a value that is zero or not finite.
+    #[error(
+        "point {index} of the frequency response, at {} rad/s, is not usable: frequencies must rise from above 0, values be finite and not 0",
+        number(*.omega_rad_s)
+    )]
+    Point {
+        /// Its place, from 1.
+        index: usize,
+        /// Its frequency in rad/s.
+        omega_rad_s: f64,
+    },
+    /// The gain of the loop has not fallen under 1 at the last frequency.
+    #[error(
+        "the loop's gain is still {} at the last measured frequency, {} rad/s: whether it is stable cannot be told; measure up to where it is well under 1",
+        number(*.gain),
+        number(*.omega_rad_s)
+    )]
+    TooShort {
+        /// |L| there.
+        gain: f64,
+        /// The last frequency in rad/s.
+        omega_rad_s: f64,
+    },
+}
+
+impl FrequencyResponseError {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        vec![
+            Self::TooFew { count: 2 },
+            Self::Point { index: 3, omega_rad_s: 0.1 },
+            Self::TooShort { gain: 1.2, omega_rad_s: 0.3 },
+        ]
+    }
+}
+
+impl Explain for FrequencyResponseError {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::TooFew { .. } => "frequency_response.too_few",
+            Self::Point { .. } => "frequency_response.point",
+            Self::TooShort { .. } => "frequency_response.too_short",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::TooFew { count } => vec![("count", count.to_string()), ("least", FEWEST.to_string())],
+            Self::Point { index, omega_rad_s } => {
+                vec![("index", index.to_string()), ("omega", number(*omega_rad_s))]
+            }
+            Self::TooShort { gain, omega_rad_s } => {
+                vec![("gain", number(*gain)), ("omega", number(*omega_rad_s))]
+            }
+        }
+    }
+}
+
+impl FrequencyResponse {
+    /// Takes points (ω in rad/s, G(jω) in PV units per MV unit).
+    ///
+    /// # Errors
+    /// [`FrequencyResponseError`] for fewer than three points, frequencies that do not rise, values that are 0 or not
+    /// finite.
+    pub fn new(points: &[(f64, Complex64)]) -> Result<Self, FrequencyResponseError> {
+        if points.len() < FEWEST {
+            return Err(FrequencyResponseError::TooFew { count: points.len() });
+        }
+        let mut before = 0.0;
+        for (i, (omega, g)) in points.iter().enumerate() {
+            let usable = *omega > before && omega.is_finite() && g.is_finite() && g.norm_sqr() > 0.0;
+            if !usable {
+                return Err(FrequencyResponseError::Point { index: i + 1, omega_rad_s: *omega });
+            }
+            before = *omega;
+        }
+        let log_omega: Vec<f64> = points.iter().map(|p| p.0.ln()).collect();
+        let log_gain: Vec<f64> = points.iter().map(|p| p.1.norm().ln()).collect();
+        let slope = (log_gain[1] - log_gain[0]) / (log_omega[1] - log_omega[0]);
+        let power = if slope < INTEGRATES { -1 } else { 0 };
+        // The phase at ω → 0 of a positive gain; a negative one is half a turn away from it.
+        let upright = f64::from(power) * FRAC_PI_2;
+        let first = points[0].1.arg();
+        let away = (first - upright).rem_euclid(2.0 * PI);
+        // Lag up to three quarters of a turn is a dead time's or a lag's, from there on a negative gain's.
+        let negative = (0.25 * PI..1.25 * PI).contains(&away);
+        let start = if negative { upright + PI } else { upright };
+        let mut phase_rad = Vec::with_capacity(points.len());
+        let mut last = start;
+        for (_, g) in points {
+            let turns = ((last - g.arg()) / (2.0 * PI)).round();
+            last = g.arg() + 2.0 * PI * turns;
+            phase_rad.push(last);
+        }
+        let gain = (log_gain[0] - f64::from(power) * log_omega[0]).exp();
+        let low = Asymptote { coefficient: if negative { -gain } else { gain }, power };
+        Ok(Self { log_omega, log_gain, phase_rad, low })
+    }
+
+    /// First measured frequency in rad/s.
+    #[must_use]
+    pub fn first_omega(&self) -> f64 {
+        self.log_omega[0].exp()
+    }
+
+    /// Last measured frequency in rad/s.
+    #[must_use]
+    pub fn last_omega(&self) -> f64 {
+        self.log_omega[self.log_omega.len() - 1].exp()
+    }
+
+    pub(crate) fn low(&self) -> Asymptote {
+        self.low
+    }
+
+    /// G(jω), ω > 0 in rad/s; beyond the last point its last slope goes on.
+    #[must_use]
+    pub fn at_omega(&self, omega_rad_s: f64) -> Complex64 {
+        let x = omega_rad_s.ln();
+        if x <= self.log_omega[0] {
+            let power = f64::from(self.low.power);
+            let limit = power * FRAC_PI_2 + if self.low.coefficient < 0.0 { PI } else { 0.0 };
+            let share = omega_rad_s / self.first_omega();
+            let phase = limit + (self.phase_rad[0] - limit) * share;
+            return Complex64::from_polar(
+                self.low.coefficient.abs() * omega_rad_s.powi(self.low.power),
+                phase,
+            );
+        }
+        let last = self.log_omega.len() - 1;
+        let i = self.log_omega.partition_point(|w| *w < x).clamp(1, last);
+        let share = (x - self.log_omega[i - 1]) / (self.log_omega[i] - self.log_omega[i - 1]);
+        let between = |of: &[f64]| of[i - 1] + share * (of[i] - of[i - 1]);
+        Complex64::from_polar(between(&self.log_gain).exp(), between(&self.phase_rad))
+    }
+
+    fn search_frequencies(&self) -> Vec<f64> {
+        let mut found = Vec::with_capacity(BETWEEN * self.log_omega.len() + 64);
+        let below = DECADES_BELOW * std::f64::consts::LN_10;
+        let steps = 60;
+        found.extend(
+            (0..steps).map(|k| (self.log_omega[0] - below * (1.0 - f64::from(k) / f64::from(steps))).exp()),
+        );
+        for pair in self.log_omega.windows(2) {
+            let step = (pair[1] - pair[0]) / BETWEEN as f64;
+            found.extend((0..BETWEEN).map(|k| (pair[0] + k as f64 * step).exp()));
+        }
+        found.push(self.last_omega());
+        found
+    }
+}
+
+/// Peaks of the loop of a measured process and a controller over the measured range; `None` for an unstable loop.
+///
+/// # Errors
+/// [`FrequencyResponseError::TooShort`] where the loop's gain is 1 or more at the last frequency.
+pub fn measured_peaks(
+    response: &FrequencyResponse,
+    gains: &ParallelGains,
+) -> Result<Option<Peaks>, FrequencyResponseError> {
+    let walked = Walk::new(response, gains);
+    let end = walked.points[walked.points.len() - 1];
+    if end.l.norm() >= 1.0 {
+        return Err(FrequencyResponseError::TooShort { gain: end.l.norm(), omega_rad_s: end.omega });
+    }
+    if !walked.is_stable() {
+        return Ok(None);
+    }
+    Ok(Some(walked.peaks()))
+}
+
+/// The analysis of the loop of a measured process and a controller; an unstable loop has no measures.
+///
+/// # Errors
+/// [`FrequencyResponseError::TooShort`] where the loop's gain is 1 or more at the last frequency.
+pub fn analyze_measured(
+    response: &FrequencyResponse,
+    gains: &ParallelGains,
+) -> Result<Analysis, FrequencyResponseError> {
+    let Some(peaks) = measured_peaks(response, gains)? else { return Ok(Analysis::default()) };
+    let walked = Walk::new(response, gains);
+    let finite = |v: f64| Some(v).filter(|v| v.is_finite());
+    let mut analysis = Analysis {
+        stable: true,
+        ms: finite(peaks.s.value),
+        mt: finite(peaks.t.value),
+        jv: finite(peaks.v.value),
+        ju: finite(peaks.u.value),
+        ..Analysis::default()
+    };
+    walked.margins(&mut analysis);
+    Ok(analysis)
+}
+
+#[derive(Clone, Copy)]
+struct Seen {
+    omega: f64,
+    l: Complex64,
+}
+
+/// The loop along the frequencies of the search.
+struct Walk<'a> {
+    response: &'a FrequencyResponse,
+    gains: &'a ParallelGains,
+    points: Vec<Seen>,
+}
+
+impl<'a> Walk<'a> {
+    fn new(response: &'a FrequencyResponse, gains: &'a ParallelGains) -> Self {
+        let at = |omega: f64| Seen { omega, l: response.at_omega(omega) * gains.at_omega(omega) };
+        Self { response, gains, points: response.search_frequencies().into_iter().map(at).collect() }
+    }
+
+    fn l(&self, omega: f64) -> Complex64 {
+        self.response.at_omega(omega) * self.gains.at_omega(omega)
+    }
+
+    /// Number of integrators of the loop, and the first term's sign.
+    fn low(&self) -> (i32, f64) {
+        let ParallelGains { kp, ki, .. } = *self.gains;
+        let (power, controller) = if ki == 0.0 { (0, kp) } else { (-1, ki) };
+        (power + self.response.low.power, controller * self.response.low.coefficient)
+    }
+
+    /// Whether 1 + L turns by π/2 for each integrator from ω → 0 to ∞, as a stable loop of a stable process does.
+    fn is_stable(&self) -> bool {
+        let (power, coefficient) = self.low();
+        if power == 0 && 1.0 + coefficient <= 0.0 {
+            return false;
+        }
+        let start = if power == 0 {
+            0.0
+        } else {
+            f64::from(power) * FRAC_PI_2 + if coefficient < 0.0 { PI } else { 0.0 }
+        };
+        let (mut total, mut last) = (0.0, start);
+        for point in &self.points {
+            let angle = (1.0 + point.l).arg();
+            let step = (angle - last + PI).rem_euclid(2.0 * PI) - PI;
+            total += step;
+            last = angle;
+        }
+        // The rest of the way |L| < 1 and 1 + L stays to the right.
+        total -= last;
+        (total + f64::from(power) * FRAC_PI_2).abs() < 0.5
+    }
+
+    fn peaks(&self) -> Peaks {
+        let g = |omega: f64| self.response.at_omega(omega).norm_sqr();
+        let reciprocal = |k: usize, omega: f64| {
+            let l = self.l(omega);
+            let d = (1.0 + l).norm_sqr();
+            match k {
+                0 => d,
+                1 => d / l.norm_sqr(),
+                2 => d * omega * omega / g(omega),
+                _ => d / self.gains.at_omega(omega).norm_sqr(),
+            }
+        };
+        let peak = |k: usize| -> Peak {
+            let values: Vec<(f64, f64)> =
+                self.points.iter().map(|p| (p.omega, reciprocal(k, p.omega))).collect();
+            let mut best =
+                values.iter().copied().fold((0.0, f64::INFINITY), |b, v| if v.1 < b.1 { v } else { b });
+            for triple in values.windows(3) {
+                if triple[1].1 < triple[0].1 && triple[1].1 <= triple[2].1 && triple[1].1 < 2.0 * best.1 {
+                    let found = minimum(|w| reciprocal(k, w), triple[0], triple[1], triple[2]);
+                    if found.1 < best.1 {
+                        best = found;
+                    }
+                }
+            }
+            Peak { value: 1.0 / best.1.sqrt(), omega_rad_s: best.0 }
+        };
+        let [s, t, mut v, mut u] = [0, 1, 2, 3].map(peak);
+        let ParallelGains { kp, ki, kd, tf_s } = *self.gains;
+        if ki != 0.0 && v.value < 1.0 / ki.abs() {
+            v = Peak { value: 1.0 / ki.abs(), omega_rad_s: 0.0 };
+        }
+        // Where G has fallen to nothing S is 1 and the controller speaks alone.
+        let high = if kd == 0.0 { kp } else { kp + kd / tf_s };
+        if u.value < high.abs() {
+            u = Peak { value: high.abs(), omega_rad_s: f64::INFINITY };
+        }
+        Peaks { s, t, v, u }
+    }
+
+    fn margins(&self, to: &mut Analysis) {
+        let mut nearest: Option<(f64, f64)> = None;
+        for pair in self.points.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            let excess = |l: Complex64| l.norm().ln();
+            if (excess(a.l) > 0.0) != (excess(b.l) > 0.0) {
+                let omega = root(|w| excess(self.l(w)), (a.omega, excess(a.l)), (b.omega, excess(b.l)));
+                let (angle, lag) = angle_to_critical(self.l(omega));
+                if nearest.is_none_or(|(_, best)| angle < best) {
+                    nearest = Some((omega, angle));
+                }
+                let delay = lag / omega;
+                if to.delay_margin_s.is_none_or(|best| delay < best) {
+                    to.delay_margin_s = Some(delay);
+                }
+            }
+            if (a.l.im > 0.0) != (b.l.im > 0.0) && a.l.re.min(b.l.re) < 0.0 {
+                let sine = |l: Complex64| l.im / l.norm();
+                let omega = root(|w| sine(self.l(w)), (a.omega, sine(a.l)), (b.omega, sine(b.l)));
+                let l = self.l(omega);
+                let margin = 1.0 / l.norm();
+                if l.re >= 0.0 {
+                    continue;
+                }
+                if margin > 1.0 && to.gain_margin.is_none_or(|m| margin < m) {
+                    (to.gain_margin, to.w_180_rad_s) = (Some(margin), Some(omega));
+                }
+                if margin < 1.0 && to.gain_reduction_margin.is_none_or(|m| margin > m) {
+                    to.gain_reduction_margin = Some(margin);
+                }
+            }
+        }
+        to.phase_margin_deg = nearest.map(|(_, angle)| angle.to_degrees());
+        to.w_gc_rad_s = nearest.map(|(omega, _)| omega);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analyze::analyze;
+    use crate::control::PidGains;
+    use crate::model::{Fopdt, Ipdt, ProcessModel};
+
+    fn points_of(model: &ProcessModel, from: f64, to: f64, count: usize) -> FrequencyResponse {
+        let tf = model.transfer_function();
+        let ratio = (to / from).powf(1.0 / (count - 1) as f64);
+        let omegas = (0..count).map(|k| from * ratio.powi(k as i32));
+        FrequencyResponse::new(&omegas.map(|w| (w, tf.at_omega(w))).collect::<Vec<_>>()).expect("points")
+    }
+
+    #[test]
+    fn sixty_points_say_what_the_model_says() {
+        for (model, gains, range) in [
+            (ProcessModel::Fopdt(Fopdt::new(2.0, 40.0, 6.0).expect("a model")), (1.2, 22.0), (2e-3, 1.5)),
+            (ProcessModel::Fopdt(Fopdt::new(-2.0, 40.0, 6.0).expect("a model")), (-1.2, 22.0), (2e-3, 1.5)),
+            (ProcessModel::Ipdt(Ipdt::new(0.1, 6.0).expect("a model")), (0.5, 60.0), (2e-3, 1.5)),
+        ] {
+            let response = points_of(&model, range.0, range.1, 60);
+            let ideal = PidGains::pi(gains.0, gains.1);
+            let parallel = ParallelGains { kp: ideal.kc, ki: ideal.ki(), kd: 0.0, tf_s: 0.0 };
+            let (exact, measured) =
+                (analyze(&model, &ideal), analyze_measured(&response, &parallel).expect("long enough"));
+            assert!(exact.stable && measured.stable, "{model:?}");
+            for (a, b) in [
+                (exact.ms, measured.ms),
+                (exact.mt, measured.mt),
+                (exact.jv, measured.jv),
+                (exact.ju, measured.ju),
+                (exact.gain_margin, measured.gain_margin),
+                (exact.phase_margin_deg, measured.phase_margin_deg),
+                (exact.delay_margin_s, measured.delay_margin_s),
+            ] {
+                let (a, b) = (a.expect("a figure"), b.expect("a figure"));
+                assert!((b / a - 1.0).abs() < 4e-3, "{model:?}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_unstable_loop_is_called_so_and_a_short_record_says_that_it_is_short() {
+        let model = ProcessModel::Fopdt(Fopdt::new(2.0, 40.0, 6.0).expect("a model"));
+        let response = points_of(&model, 2e-3, 1.5, 60);
+        let unstable = ParallelGains { kp: 9.0, ki: 0.1, kd: 0.0, tf_s: 0.0 };
+        assert_eq!(analyze_measured(&response, &unstable), Ok(Analysis::default()));
+        let short = points_of(&model, 2e-3, 0.01, 20);
+        let gains = ParallelGains { kp: 3.0, ki: 0.1, kd: 0.0, tf_s: 0.0 };
+        assert!(matches!(
+            analyze_measured(&short, &gains),
+            Err(FrequencyResponseError::TooShort { gain, .. }) if gain > 1.0
+        ));
+    }
+}

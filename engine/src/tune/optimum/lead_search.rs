@@ -1,0 +1,135 @@
+//! The best Td and Tf of a PID controller: every pair has its best Kp and Ki by the search over gains.
+
+use super::gain_search::{Candidate, Care, Found, GainSearch, Ground};
+use super::problem::DerivativeFilter;
+use super::simplex::{Simplex, minimise};
+use super::slice::Lead;
+use super::valley::{Spot, valley};
+
+/// Td at which the search looks first, in units of 1/ω, ω the frequency at which the loop without derivative action
+/// comes nearest to −1.
+const TDS: [f64; 9] = [0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5];
+/// N at which it looks first where the filter is free, and its range.
+const RATIOS: [f64; 3] = [1.5, 6.0, 25.0];
+pub(super) const RATIO_RANGE: (f64, f64) = (1.0, 100.0);
+/// How far a refinement may go from where it starts, as a logarithm of Td.
+const FARTHEST: f64 = 1.5;
+/// First step of a refinement, as a logarithm: after the first look, and after points have been added.
+pub(super) const STEP: f64 = 0.2;
+pub(super) const STEP_NEARBY: f64 = 0.01;
+/// Relative widths at which it ends, likewise.
+const LAST: f64 = 1e-3;
+const LAST_NEARBY: f64 = 3e-6;
+/// The same in two dimensions, where every step costs more, and the number of steps.
+const LAST_OF_TWO: f64 = 1e-4;
+const MOST_OF_TWO: usize = 60;
+
+/// The best of a grid of Td, and of N where it is free.
+pub(super) fn look(
+    search: &mut GainSearch,
+    on: &Ground<'_, '_>,
+    filter: DerivativeFilter,
+    omega: f64,
+) -> Found {
+    let ratios: &[f64] = match &filter {
+        DerivativeFilter::Ratio(n) => std::slice::from_ref(n),
+        DerivativeFilter::Free => &RATIOS,
+    };
+    let mut best = Found::Nothing;
+    for &n in ratios {
+        for td in TDS {
+            let td_s = td / omega;
+            match (search.run(on, Lead { td_s, tf_s: td_s / n }, Care::Coarse), best) {
+                (Found::Best(new), Found::Best(old)) if new.value >= old.value => {}
+                (found @ Found::Best(_), _) => best = found,
+                (Found::Unbounded, _) => return Found::Unbounded,
+                _ => {}
+            }
+        }
+    }
+    best
+}
+
+/// The best about known gains.
+pub(super) fn refine(
+    search: &mut GainSearch,
+    on: &Ground<'_, '_>,
+    filter: DerivativeFilter,
+    known: Candidate,
+    step: f64,
+) -> Found {
+    let mut kp = known.kp;
+    let start = known.lead.td_s.ln();
+    let mut at = |x: f64, n: f64| -> AtLead {
+        if (x - start).abs() > FARTHEST {
+            return AtLead { x, found: None };
+        }
+        let td_s = x.exp();
+        let lead = Lead { td_s, tf_s: td_s / n };
+        match search.run(on, lead, Care::CoarseNear(kp)) {
+            Found::Best(found) => {
+                kp = found.kp;
+                AtLead { x, found: Some(found) }
+            }
+            _ => AtLead { x, found: None },
+        }
+    };
+    let precise = step <= STEP_NEARBY;
+    let last = if precise { LAST_NEARBY } else { LAST };
+    let best = match filter {
+        DerivativeFilter::Ratio(n) => along(&mut |x| at(x, n), start, step, last),
+        DerivativeFilter::Free => {
+            let mut best: Option<Candidate> = None;
+            let start = [start, (known.lead.td_s / known.lead.tf_s).ln()];
+            let mut value = |x: &[f64]| {
+                let here = at(x[0], x[1].exp().clamp(RATIO_RANGE.0, RATIO_RANGE.1));
+                if here.value() < best.map_or(f64::INFINITY, |b| b.value) {
+                    best = here.found;
+                }
+                here.value()
+            };
+            let last_step = last.max(LAST_OF_TWO);
+            let simplex = Simplex { step, last_step, most_evaluations: MOST_OF_TWO };
+            minimise(&simplex, &start, &mut value);
+            best
+        }
+    };
+    best.map_or(Found::Nothing, Found::Best)
+}
+
+/// Walks downhill along ln Td until it stands in a valley, and to its bottom.
+fn along(at: &mut dyn FnMut(f64) -> AtLead, x: f64, step: f64, last: f64) -> Option<Candidate> {
+    const MOST: usize = 16;
+    let (mut a, mut m, mut b) = (at(x - step), at(x), at(x + step));
+    for _ in 0..MOST {
+        if a.value() < m.value() {
+            (b, m) = (m, a);
+            a = at(m.x - 1.6 * (b.x - m.x));
+        } else if b.value() < m.value() {
+            (a, m) = (m, b);
+            b = at(m.x + 1.6 * (m.x - a.x));
+        } else {
+            break;
+        }
+    }
+    // The width is that of a logarithm: absolute here, relative to Td.
+    let unit = a.x.abs().max(b.x.abs()).max(1e-3);
+    valley(at, a, m, b, last / unit).found
+}
+
+/// Best gains of a ln Td.
+#[derive(Clone, Copy)]
+struct AtLead {
+    x: f64,
+    found: Option<Candidate>,
+}
+
+impl Spot for AtLead {
+    fn at(&self) -> f64 {
+        self.x
+    }
+
+    fn value(&self) -> f64 {
+        self.found.map_or(f64::INFINITY, |f| f.value)
+    }
+}

@@ -1,0 +1,335 @@
+//! Solve on points of frequency, check exactly, add what was passed, solve again.
+
+use super::by_simulation;
+use super::certificate::{Certificate, Check, MET, Optimum};
+use super::error::OptimumError;
+use super::family::Family;
+use super::floor;
+use super::gain_search::{Candidate, Care, Found, GainSearch, Ground};
+use super::lead_search;
+use super::points::Plant;
+use super::problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
+use super::slice::Lead;
+
+/// Rounds of search and check, and of the last steps at fixed Kp, at most.
+const ROUNDS: usize = 14;
+const LAST_STEPS: usize = 14;
+/// Relative excess over a limit from which on Kp, Td and Tf stay as they are.
+const CLOSE: f64 = 2e-6;
+/// Ms that no optimum passes, whatever the limit: beyond it a loop is all but unstable.
+pub(super) const LARGEST_MS: f64 = 8.0;
+/// Limit on Ms from which on the points lie twice as close.
+const LAX_MS: f64 = 2.5;
+/// Searches on ever more of the points, and how well they must agree with all of them.
+const TRIALS: i32 = 5;
+const SEEN: f64 = 1e-6;
+/// Points added on each side of a peak, and how far they reach in units of the square root of its excess.
+const CLUSTER: i32 = 4;
+const WANDER: f64 = 3.0;
+/// How much closer the search over gains looks where a first look finds nothing.
+const DENSER: u32 = 8;
+
+/// The best gains of a problem, certified.
+///
+/// # Errors
+/// [`OptimumError`]: limits that cannot be used or met, with the floor; a process that the controller does not stabilise;
+/// an objective without bound.
+pub fn optimum(problem: &OptimumProblem<'_>) -> Result<Optimum, OptimumError> {
+    validate(problem)?;
+    let sign = Plant::new(&problem.processes[0]).low.coefficient.signum();
+    let found = with_sign(problem, sign);
+    match found {
+        // An unstable process may want the other sign than its static gain has.
+        Err(OptimumError::NotStabilisable { .. }) => with_sign(problem, -sign),
+        _ => found,
+    }
+}
+
+fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, OptimumError> {
+    let mut solver = Solver::new(problem, sign);
+    if let Some(refused) = floor::of_ju(&solver) {
+        return Err(refused);
+    }
+    match problem.objective {
+        Objective::Jv | Objective::MaxKi => solver.solve(problem.objective),
+        Objective::IaeLoad | Objective::IaeSetpoint => by_simulation::solve(&mut solver, problem.objective),
+    }
+}
+
+fn validate(problem: &OptimumProblem<'_>) -> Result<(), OptimumError> {
+    let LoopLimits { ms, mt, ju } = problem.limits;
+    if ms.is_nan() || ms <= 1.0 {
+        return Err(OptimumError::Ms { value: ms });
+    }
+    if mt.is_nan() || mt < 1.0 {
+        return Err(OptimumError::Mt { value: mt });
+    }
+    if ju.is_nan() || ju <= 0.0 {
+        return Err(OptimumError::Ju { value: ju });
+    }
+    if ms.is_infinite() && mt.is_infinite() && ju.is_infinite() {
+        return Err(OptimumError::NoLimit);
+    }
+    if let Wanted::Pid(DerivativeFilter::Ratio(n)) = problem.wanted
+        && !(n > 0.0 && n.is_finite())
+    {
+        return Err(OptimumError::Filter { value: n });
+    }
+    let measured = problem.processes.iter().any(|p| matches!(p, Process::Measured(_)));
+    if measured && matches!(problem.objective, Objective::IaeLoad | Objective::IaeSetpoint) {
+        return Err(OptimumError::NeedsModel);
+    }
+    if problem.processes.is_empty() { Err(OptimumError::NoProcess) } else { Ok(()) }
+}
+
+/// A problem with its points and workspace.
+pub(super) struct Solver<'a> {
+    pub family: Family<'a>,
+    pub search: GainSearch,
+    pub wanted: Wanted,
+    pub limits: LoopLimits,
+}
+
+impl<'a> Solver<'a> {
+    fn new(problem: &OptimumProblem<'a>, sign: f64) -> Self {
+        let mut family = Family::new(problem.processes, sign);
+        let limits = LoopLimits { ms: problem.limits.ms.min(LARGEST_MS), ..problem.limits };
+        // The circle that a lax limit forbids is small: points this far apart would step over it.
+        if limits.ms > LAX_MS {
+            (0..family.plants.len()).for_each(|plant| family.refine(plant));
+        }
+        Self { family, search: GainSearch::default(), wanted: problem.wanted, limits }
+    }
+
+    pub fn controller(&self) -> &'static str {
+        if self.wanted == Wanted::Pi { "PI" } else { "PID" }
+    }
+
+    /// The whole range, without a start.
+    pub fn look_everywhere(&mut self, objective: Objective, limits: &LoopLimits) -> Found {
+        let on = Ground { family: &self.family, points: &self.family.points, limits: *limits, objective };
+        let mut pi = self.search.run(&on, Lead::NONE, Care::Full);
+        if pi == Found::Nothing {
+            pi = self.search.run(&on, Lead::NONE, Care::Dense(DENSER));
+        }
+        let Wanted::Pid(filter) = self.wanted else { return pi };
+        let omega = match pi {
+            Found::Best(found) => self.nearest_omega(&found),
+            Found::Unbounded => return Found::Unbounded,
+            Found::Nothing | Found::NotStabilising => self.family.plants[0].typical_omega(),
+        };
+        let mut pid = lead_search::look(&mut self.search, &on, filter, omega);
+        if pid == Found::Nothing {
+            // What needs derivative action to be stable at all may be far slower than its own frequencies say.
+            pid = lead_search::look(&mut self.search, &on, filter, 0.1 * omega);
+        }
+        let pid = match pid {
+            Found::Best(known) => self.refined(objective, limits, filter, known, lead_search::STEP),
+            other => other,
+        };
+        match (pid, pi) {
+            (Found::Best(with), Found::Best(without)) if without.value < with.value => pi,
+            (Found::Best(_) | Found::Unbounded, _) => pid,
+            _ => pi,
+        }
+    }
+
+    /// About known gains, on the points that bear on them and on those that turn out to.
+    fn refined(
+        &mut self,
+        objective: Objective,
+        limits: &LoopLimits,
+        filter: DerivativeFilter,
+        known: Candidate,
+        step: f64,
+    ) -> Found {
+        let all = &self.family.points;
+        let mut points = all.near(limits, known.lead, known.kp, known.ki);
+        let whole = Ground { family: &self.family, points: all, limits: *limits, objective };
+        let mut best: Option<Candidate> = None;
+        for trial in 0..TRIALS {
+            let on = Ground { points: &points, ..whole };
+            let step = step * 0.5f64.powi(trial);
+            let start = best.unwrap_or(known);
+            let Found::Best(found) = lead_search::refine(&mut self.search, &on, filter, start, step) else {
+                break;
+            };
+            // What the other points make of it.
+            let seen = self.search.at_gain(&whole, found.lead, found.kp);
+            let stable = seen.filter(|seen| self.family.is_stable(seen.lead, seen.kp, seen.ki));
+            if let Some(seen) = stable
+                && best.is_none_or(|b| seen.value < b.value)
+            {
+                best = Some(seen);
+            }
+            if stable.is_some_and(|seen| seen.value - found.value <= SEEN * found.value.abs()) {
+                break;
+            }
+            points.extend(&all.near(limits, found.lead, found.kp, found.ki));
+        }
+        best.map_or(Found::Best(known), Found::Best)
+    }
+
+    /// Where the loop of a candidate comes nearest to −1, in rad/s.
+    fn nearest_omega(&self, candidate: &Candidate) -> f64 {
+        let gains = self.family.gains(candidate.lead, candidate.kp, candidate.ki);
+        let typical = self.family.plants[0].typical_omega();
+        let peak = self.family.peaks(0, &gains).ok().flatten().map(|p| p.s.omega_rad_s);
+        peak.filter(|w| *w > 0.0 && w.is_finite()).unwrap_or(typical)
+    }
+
+    fn look_nearby(&mut self, objective: Objective, known: Candidate) -> Found {
+        let limits = self.limits;
+        match self.wanted {
+            Wanted::Pid(filter) if known.lead.td_s > 0.0 => {
+                self.refined(objective, &limits, filter, known, lead_search::STEP_NEARBY)
+            }
+            _ => {
+                let points = self.family.points.near(&limits, known.lead, known.kp, known.ki);
+                let on = Ground { family: &self.family, points: &points, limits, objective };
+                self.search.run(&on, known.lead, Care::Near(known.kp))
+            }
+        }
+    }
+
+    /// The best Ki of given Kp, Td and Tf.
+    pub fn at_gain(
+        &mut self,
+        objective: Objective,
+        limits: &LoopLimits,
+        lead: Lead,
+        kp: f64,
+    ) -> Option<Candidate> {
+        let on = Ground { family: &self.family, points: &self.family.points, limits: *limits, objective };
+        self.search.at_gain(&on, lead, kp)
+    }
+
+    /// Least Jv or largest Ki; where no gains meet the limits, the floor.
+    pub fn solve(&mut self, objective: Objective) -> Result<Optimum, OptimumError> {
+        match self.within_limits(objective)? {
+            Some(found) => Ok(found),
+            None => Err(floor::explain(self)),
+        }
+    }
+
+    /// Least Jv or largest Ki; `None` where no gains meet the limits.
+    pub fn within_limits(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
+        let mut known: Option<Candidate> = None;
+        let mut excess = f64::INFINITY;
+        for round in 1..=ROUNDS {
+            let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(objective, k));
+            if found == Found::Nothing {
+                let limits = self.limits;
+                found = self.look_everywhere(objective, &limits);
+            }
+            let candidate = match found {
+                Found::Best(candidate) => candidate,
+                Found::Unbounded => return Err(OptimumError::Unbounded),
+                Found::NotStabilising => {
+                    return Err(OptimumError::NotStabilisable { controller: self.controller() });
+                }
+                Found::Nothing => return Ok(None),
+            };
+            let check = self.check(objective, &candidate)?;
+            if !check.unstable.is_empty() {
+                // A window narrower than the points: closer ones everywhere.
+                check.unstable.iter().for_each(|plant| self.family.refine(*plant));
+                known = None;
+                continue;
+            }
+            // The first look is a coarse one.
+            if known.is_none() {
+                self.add(&check);
+                known = Some(candidate);
+                continue;
+            }
+            excess = check.excess;
+            if let Some(found) = self.accepted(objective, candidate, check, round)? {
+                return Ok(Some(found));
+            }
+            known = Some(candidate);
+        }
+        Err(OptimumError::NotCertified { excess_percent: 100.0 * excess })
+    }
+
+    pub fn check(&self, objective: Objective, candidate: &Candidate) -> Result<Check, OptimumError> {
+        Check::of(&self.family, &self.limits, objective, candidate).map_err(OptimumError::Measured)
+    }
+
+    /// Adds the frequencies at which a limit was passed, and some about them: the next gains put the peak elsewhere.
+    ///
+    /// A peak between two points stands out of them by about the square of their distance, so the square root of the
+    /// excess is the distance over which the peak may wander.
+    pub fn add(&mut self, check: &Check) {
+        for &(plant, omega, excess) in &check.passed {
+            let reach = WANDER * excess.sqrt().clamp(1e-6, 0.3);
+            for k in -CLUSTER..=CLUSTER {
+                let away = f64::from(k) / f64::from(CLUSTER);
+                self.family.add(plant, omega * (reach * away).exp());
+            }
+        }
+    }
+
+    /// The candidate made exact, if it is close to the limits; else its frequencies are added.
+    fn accepted(
+        &mut self,
+        objective: Objective,
+        candidate: Candidate,
+        check: Check,
+        round: usize,
+    ) -> Result<Option<Optimum>, OptimumError> {
+        let seen = candidate.value;
+        let hidden = if objective == Objective::Jv { check.peaks.v.value / seen - 1.0 } else { 0.0 };
+        self.add(&check);
+        if check.excess > CLOSE || hidden > CLOSE {
+            return Ok(None);
+        }
+        let Some((last, check)) = self.last_steps(objective, candidate, check)? else { return Ok(None) };
+        let value = if objective == Objective::Jv { check.peaks.v.value } else { last.ki };
+        Ok(Some(Optimum {
+            gains: self.family.gains(last.lead, last.kp, last.ki),
+            value,
+            certificate: Certificate {
+                active: check.active(&self.limits),
+                peaks: check.peaks,
+                gap: Some((1.0 - seen / if objective == Objective::Jv { value } else { -value }).abs()),
+                excess: check.excess.max(0.0),
+                rounds: round,
+            },
+        }))
+    }
+
+    /// Ki alone follows the limits down to rounding: at fixed Kp, Td and Tf the points converge quadratically.
+    fn last_steps(
+        &mut self,
+        objective: Objective,
+        candidate: Candidate,
+        check: Check,
+    ) -> Result<Option<(Candidate, Check)>, OptimumError> {
+        let (mut last, mut check) = (candidate, check);
+        let mut limits = self.limits;
+        for _ in 0..LAST_STEPS {
+            if check.excess <= MET {
+                return Ok(Some((last, check)));
+            }
+            let next = self.at_gain(objective, &limits, last.lead, last.kp);
+            let Some(next) = next else {
+                // The limit bears on Kp itself: a little less of it, and of the limit on Ki.
+                last.kp *= 1.0 - 2.0 * check.excess.max(MET);
+                continue;
+            };
+            last = next;
+            check = self.check(objective, &last)?;
+            if !check.unstable.is_empty() {
+                return Ok(None);
+            }
+            self.add(&check);
+            if check.excess > MET && check.passed.is_empty() {
+                limits.ms *= 1.0 - check.excess;
+                limits.ju *= 1.0 - check.excess;
+                last.kp *= 1.0 - check.excess;
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,320 @@
+//! Optima against published ones, against golden numbers made by independent tools, and against plain searches.
+
+use num_complex::Complex64;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use vasos_engine::analyze::{FrequencyResponse, OpenLoop, analyze_loop, is_loop_stable};
+use vasos_engine::control::ParallelGains;
+use vasos_engine::model::{Fopdt, Ipdt, ProcessModel};
+use vasos_engine::tune::optimum::{
+    DerivativeFilter, Limit, LoopLimits, Objective, Optimum, OptimumError, OptimumProblem, Process, Wanted,
+    optimum,
+};
+
+const FREE: f64 = f64::INFINITY;
+
+fn rational(num: &[f64], den: &[f64], dead_time_s: f64) -> ProcessModel {
+    ProcessModel::rational(num, den, dead_time_s).expect("a model")
+}
+
+fn solve(
+    model: &ProcessModel,
+    wanted: Wanted,
+    objective: Objective,
+    limits: LoopLimits,
+) -> Result<Optimum, OptimumError> {
+    let processes = [Process::Model(model.clone())];
+    optimum(&OptimumProblem { processes: &processes, wanted, objective, limits })
+}
+
+/// Everything that makes an optimum one, but that nothing is better.
+fn check(model: &ProcessModel, limits: &LoopLimits, found: &Optimum) {
+    let analysis = analyze_loop(&OpenLoop::of_parallel(model, &found.gains));
+    assert!(analysis.stable, "{found:?}");
+    for (value, limit) in [(analysis.ms, limits.ms), (analysis.mt, limits.mt), (analysis.ju, limits.ju)] {
+        assert!(value.expect("finite") <= limit * (1.0 + 1e-8), "{limits:?} {found:?}");
+    }
+    assert!(!found.certificate.active.is_empty(), "{found:?}");
+    assert!(found.certificate.gap.is_none_or(|gap| gap < 1e-4), "{found:?}");
+}
+
+/// golden/optimal_pi.json: numpy and scipy, dense grids; Jv good to 2e-5, the last case to 1e-3.
+#[test]
+fn val_least_jv_of_the_golden_file() {
+    let golden: serde_json::Value =
+        serde_json::from_str(include_str!("../../assets/golden/optimal_pi.json")).expect("json");
+    let number = |v: &serde_json::Value| v.as_f64().unwrap_or(FREE);
+    for case in golden["cases"].as_array().expect("cases") {
+        let (m, l, best) = (&case["model"], &case["limits"], &case["optimum"]);
+        let model = Fopdt::new(number(&m["K"]), number(&m["T_s"]), number(&m["L_s"])).expect("a model");
+        let model = ProcessModel::Fopdt(model);
+        let limits = LoopLimits { ms: number(&l["Ms"]), mt: number(&l["Mt"]), ju: number(&l["Ju"]) };
+        let found = solve(&model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+        check(&model, &limits, &found);
+        let tolerance = if best["Ms"].is_null() { 1e-3 } else { 3e-5 };
+        let ratio = found.value / number(&best["Jv"]);
+        assert!((ratio - 1.0).abs() < tolerance, "{}: Jv {} ({ratio})", case["case"], found.value);
+    }
+}
+
+/// Åström and Hägglund's test batch with the reference values of spec tune.md, section 3: Ki within 2e-5 (given to
+/// four to seven digits), where spec asks for 1e-3.
+#[test]
+fn val_largest_ki_of_the_test_batch() {
+    let batch = [
+        (rational(&[1.0], &[1.0, 3.0, 3.0, 1.0], 0.0), 0.325317, 0.685190),
+        (rational(&[1.0], &[1.0, 1.0], 1.0), 0.373036, 0.714271),
+        (rational(&[-2.0, 1.0], &[1.0, 3.0, 3.0, 1.0], 0.0), 0.100631, 0.184296),
+        (rational(&[9.0], &[1.0, 3.0, 11.0, 9.0], 0.0), 0.838806, 1.540954),
+        (rational(&[1.0], &[1.0, 3.0, 3.0, 1.0], 15.0), 0.026624, 0.048205),
+        (rational(&[1.0], &[1.0, 2.0, 1.0, 0.0], 0.0), 1.0 / 84.0, 1.0 / 24.0),
+    ];
+    for (model, at_1_4, at_2) in &batch {
+        for (ms, ki) in [(1.4, at_1_4), (2.0, at_2)] {
+            let limits = LoopLimits { ms, mt: FREE, ju: FREE };
+            let found = solve(model, Wanted::Pi, Objective::MaxKi, limits).expect("an optimum");
+            check(model, &limits, &found);
+            assert!((found.gains.ki / ki - 1.0).abs() < 2e-5, "{model:?} {ms}: {} {ki}", found.gains.ki);
+        }
+    }
+}
+
+/// The best of a plain search over Kp and Ki: a grid, then finer grids about its best.
+///
+/// Independent of the optimum: it asks nothing but the exact analysis at every gain.
+fn plain_search(model: &ProcessModel, limits: &LoopLimits, kp: (f64, f64), ki: (f64, f64)) -> f64 {
+    let value = |kp: f64, ki: f64| -> f64 {
+        let open = OpenLoop::of_parallel(model, &ParallelGains { kp, ki, kd: 0.0, tf_s: 0.0 });
+        let a = analyze_loop(&open);
+        let met = a.stable
+            && a.ms.is_some_and(|v| v <= limits.ms)
+            && a.mt.is_some_and(|v| v <= limits.mt)
+            && a.ju.is_some_and(|v| v <= limits.ju);
+        if met { a.jv.unwrap_or(FREE) } else { FREE }
+    };
+    let (mut kp, mut ki) = (kp, ki);
+    let mut best = (FREE, 0.0, 0.0);
+    const STEPS: u32 = 40;
+    for _ in 0..14 {
+        for i in 0..=STEPS {
+            for j in 0..=STEPS {
+                let at = |range: (f64, f64), k: u32| {
+                    range.0 + (range.1 - range.0) * f64::from(k) / f64::from(STEPS)
+                };
+                let (p, i) = (at(kp, i), at(ki, j));
+                let v = value(p, i);
+                if v < best.0 {
+                    best = (v, p, i);
+                }
+            }
+        }
+        let around = |centre: f64, range: (f64, f64)| {
+            let half = 0.3 * (range.1 - range.0);
+            ((centre - half).max(0.0), centre + half)
+        };
+        (kp, ki) = (around(best.1, kp), around(best.2, ki));
+    }
+    best.0
+}
+
+/// Random models of the kinds that rules are made for, and random limits, against the plain search.
+#[test]
+fn no_plain_search_finds_a_better_pi() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+    for trial in 0..12 {
+        let t = 10f64.powf(random.random_range(-0.5..1.5));
+        let model = match trial % 4 {
+            0 => ProcessModel::Fopdt(
+                Fopdt::new(random.random_range(0.2..5.0), t, t * random.random_range(0.05..3.0))
+                    .expect("a model"),
+            ),
+            1 => ProcessModel::Ipdt(Ipdt::new(random.random_range(0.05..2.0) / t, 0.3 * t).expect("a model")),
+            2 => {
+                let zeta = random.random_range(0.15..0.7);
+                rational(&[1.0], &[t * t, 2.0 * zeta * t, 1.0], 0.2 * t)
+            }
+            _ => rational(&[-0.5 * t, 1.0], &[t * t, 2.0 * t, 1.0], 0.1 * t),
+        };
+        let mt = if trial % 4 == 1 { random.random_range(1.3..2.0) } else { random.random_range(1.05..1.6) };
+        let limits = LoopLimits { ms: random.random_range(1.25..2.0), mt, ju: FREE };
+        let found = solve(&model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+        check(&model, &limits, &found);
+        let (kp, ki) = (found.gains.kp, found.gains.ki);
+        let plain = plain_search(&model, &limits, (0.0, 4.0 * kp.max(0.02 * ki * t)), (0.0, 3.0 * ki));
+        // The plain search stops short of the corner by what its last grid leaves.
+        assert!(found.value <= plain * (1.0 + 1e-6), "{model:?} {limits:?}: {} {plain}", found.value);
+        assert!(plain <= found.value * 1.03, "{model:?} {limits:?}: {} {plain}", found.value);
+    }
+}
+
+/// The mirror image of a process has the mirror image of its optimum.
+#[test]
+fn a_negative_gain_mirrors_the_optimum() {
+    for wanted in [Wanted::Pi, Wanted::Pid(DerivativeFilter::Ratio(10.0))] {
+        let of = |gain: f64| {
+            let model = ProcessModel::Fopdt(Fopdt::new(gain, 40.0, 8.0).expect("a model"));
+            solve(&model, wanted, Objective::Jv, LoopLimits::DEFAULT).expect("an optimum")
+        };
+        let (plus, minus) = (of(1.7), of(-1.7));
+        assert!((plus.gains.kp + minus.gains.kp).abs() < 1e-9 * plus.gains.kp);
+        assert!((plus.value - minus.value).abs() < 1e-9 * plus.value);
+    }
+}
+
+/// Derivative action never makes the best worse, and a free filter never worse than a fixed one.
+#[test]
+fn more_freedom_is_never_worse() {
+    for model in [
+        rational(&[1.0], &[1.0, 3.0, 3.0, 1.0], 0.0),
+        rational(&[1.0], &[1.0, 1.0], 1.0),
+        rational(&[4.9], &[152.0, 1.0], 2.0),
+        rational(&[-2.0, 1.0], &[1.0, 3.0, 3.0, 1.0], 0.0),
+    ] {
+        let limits = LoopLimits { ms: 1.6, mt: 1.4, ju: 10.0 };
+        let of = |wanted| {
+            let found = solve(&model, wanted, Objective::Jv, limits).expect("an optimum");
+            check(&model, &limits, &found);
+            found.value
+        };
+        let (pi, fixed, free) = (
+            of(Wanted::Pi),
+            of(Wanted::Pid(DerivativeFilter::Ratio(10.0))),
+            of(Wanted::Pid(DerivativeFilter::Free)),
+        );
+        assert!(fixed <= pi * (1.0 + 1e-6), "{model:?}: {pi} {fixed}");
+        assert!(free <= fixed * (1.0 + 2e-4), "{model:?}: {fixed} {free}");
+    }
+}
+
+/// An unstable process, whose static gain has the other sign: Kp from 1/K up.
+#[test]
+fn an_unstable_process_is_stabilised_first() {
+    let model = rational(&[2.0], &[10.0, -1.0], 1.0);
+    let limits = LoopLimits { ms: 2.5, mt: 3.0, ju: FREE };
+    let found = solve(&model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+    check(&model, &limits, &found);
+    let plain = plain_search(&model, &limits, (0.5, 6.0), (0.0, 1.0));
+    assert!(found.value <= plain * (1.0 + 1e-6) && plain < 1.02 * found.value, "{} {plain}", found.value);
+}
+
+#[test]
+fn limits_that_no_controller_meets_are_answered_with_the_floor() {
+    let model = ProcessModel::Fopdt(Fopdt::new(0.6335, 8.0, 1.0).expect("a model"));
+    // With integral action C S is 1/G at ω → 0.
+    let of_ju = solve(&model, Wanted::Pi, Objective::Jv, LoopLimits { ms: 1.4, mt: FREE, ju: 1.5 });
+    let Err(OptimumError::Infeasible { limit: Limit::Ju, floor, .. }) = of_ju else { panic!("{of_ju:?}") };
+    assert!((floor * 0.6335 - 1.0).abs() < 1e-12, "{floor}");
+    // An unstable process cannot be had at Ms = 1.2: what the message names as floor can be had, a little less cannot.
+    let unstable = rational(&[2.0], &[10.0, -1.0], 1.0);
+    let asked = LoopLimits { ms: 1.2, mt: FREE, ju: FREE };
+    let refused = solve(&unstable, Wanted::Pi, Objective::Jv, asked);
+    let Err(OptimumError::Infeasible { limit: Limit::Ms, floor, .. }) = refused else {
+        panic!("{refused:?}")
+    };
+    assert!(floor > 1.2 && floor < 2.5, "{floor}");
+    let with = |ms| solve(&unstable, Wanted::Pi, Objective::MaxKi, LoopLimits { ms, ..asked });
+    assert!(with(floor * 1.002).is_ok());
+    assert!(with(floor * 0.99).is_err());
+    // Nothing stabilises a double integrator with lag without derivative action.
+    let double = rational(&[1.0], &[1.0, 0.0, 0.0], 0.5);
+    let refused = solve(&double, Wanted::Pi, Objective::Jv, LoopLimits::DEFAULT);
+    assert!(matches!(refused, Err(OptimumError::NotStabilisable { .. })), "{refused:?}");
+    assert!(
+        solve(
+            &double,
+            Wanted::Pid(DerivativeFilter::Ratio(10.0)),
+            Objective::Jv,
+            LoopLimits { ms: 2.0, ..LoopLimits::DEFAULT }
+        )
+        .is_ok()
+    );
+    // Without dead time nothing holds the gain of a first order but a limit on Ju.
+    let lag = ProcessModel::Fopdt(Fopdt::new(2.0, 30.0, 0.0).expect("a model"));
+    assert_eq!(solve(&lag, Wanted::Pi, Objective::Jv, LoopLimits::DEFAULT), Err(OptimumError::Unbounded));
+    let held = LoopLimits { ms: 1.4, mt: FREE, ju: 5.0 };
+    check(&lag, &held, &solve(&lag, Wanted::Pi, Objective::Jv, held).expect("an optimum"));
+}
+
+#[test]
+fn limits_that_are_no_limits_are_refused() {
+    let model = ProcessModel::Fopdt(Fopdt::new(1.0, 8.0, 1.0).expect("a model"));
+    for (limits, key) in [
+        (LoopLimits { ms: 1.0, mt: FREE, ju: FREE }, "Ms"),
+        (LoopLimits { ms: f64::NAN, mt: FREE, ju: FREE }, "Ms"),
+        (LoopLimits { ms: 1.4, mt: 0.9, ju: FREE }, "Mt"),
+        (LoopLimits { ms: 1.4, mt: FREE, ju: -1.0 }, "Ju"),
+        (LoopLimits { ms: FREE, mt: FREE, ju: FREE }, "without any limit"),
+    ] {
+        let refused = solve(&model, Wanted::Pi, Objective::Jv, limits).expect_err("refused");
+        assert!(refused.to_string().contains(key), "{refused}");
+    }
+}
+
+/// Over a family every member meets the limits, and the family's optimum is no better than any member's own.
+#[test]
+fn a_family_is_held_to_its_worst_member() {
+    let members: Vec<ProcessModel> = [(4.2, 120.0, 2.6), (4.9, 152.0, 2.0), (5.6, 190.0, 1.6)]
+        .iter()
+        .map(|&(k, t, l)| ProcessModel::Fopdt(Fopdt::new(k, t, l).expect("a model")))
+        .collect();
+    let limits = LoopLimits { ms: 1.5, mt: 1.3, ju: FREE };
+    let processes: Vec<Process> = members.iter().cloned().map(Process::Model).collect();
+    let problem =
+        OptimumProblem { processes: &processes, wanted: Wanted::Pi, objective: Objective::Jv, limits };
+    let found = optimum(&problem).expect("an optimum");
+    let mut jv = 0.0f64;
+    let mut ms = 0.0f64;
+    for model in &members {
+        let a = analyze_loop(&OpenLoop::of_parallel(model, &found.gains));
+        assert!(a.stable && a.ms.expect("finite") <= limits.ms * (1.0 + 1e-8));
+        assert!(a.mt.expect("finite") <= limits.mt * (1.0 + 1e-8));
+        jv = jv.max(a.jv.expect("finite"));
+        ms = ms.max(a.ms.expect("finite"));
+        let own = solve(model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+        assert!(own.value <= found.value * (1.0 + 1e-6));
+    }
+    assert!((found.value / jv - 1.0).abs() < 1e-8);
+    assert!((ms / limits.ms - 1.0).abs() < 1e-4 || found.certificate.active.contains(&Limit::Mt));
+}
+
+/// Eighty points of a model's frequency response give its optimum.
+#[test]
+fn a_measured_response_gives_the_optimum_of_its_process() {
+    let model = rational(&[2.0], &[12.0, 7.0, 1.0], 1.5);
+    let tf = model.transfer_function();
+    let points: Vec<(f64, Complex64)> =
+        (0..80).map(|k| 0.01 * 10f64.powf(3.0 * f64::from(k) / 79.0)).map(|w| (w, tf.at_omega(w))).collect();
+    let measured = [Process::Measured(FrequencyResponse::new(&points).expect("points"))];
+    let limits = LoopLimits { ms: 1.6, mt: FREE, ju: FREE };
+    for wanted in [Wanted::Pi, Wanted::Pid(DerivativeFilter::Ratio(10.0))] {
+        let problem = OptimumProblem { processes: &measured, wanted, objective: Objective::Jv, limits };
+        let found = optimum(&problem).expect("an optimum");
+        let exact = solve(&model, wanted, Objective::Jv, limits).expect("an optimum");
+        assert!((found.value / exact.value - 1.0).abs() < 5e-3, "{} {}", found.value, exact.value);
+        assert!(is_loop_stable(&OpenLoop::of_parallel(&model, &found.gains)));
+    }
+}
+
+/// The least IAE is no worse than that of the least Jv, and a plain look about it finds nothing better.
+#[test]
+fn least_iae_is_a_valley() {
+    use vasos_engine::analyze::{Excitation, ResponseOptions, loop_response};
+    let model = rational(&[1.0], &[1.0, 1.0], 1.0);
+    let limits = LoopLimits { ms: 1.7, mt: FREE, ju: FREE };
+    for (objective, excitation) in
+        [(Objective::IaeLoad, Excitation::Load), (Objective::IaeSetpoint, Excitation::Setpoint)]
+    {
+        let found = solve(&model, Wanted::Pi, objective, limits).expect("an optimum");
+        check(&model, &limits, &found);
+        for (p, i) in [(1.03, 1.0), (0.97, 1.0), (1.0, 1.03), (1.0, 0.97), (1.03, 0.97), (0.97, 1.03)] {
+            let gains = ParallelGains { kp: p * found.gains.kp, ki: i * found.gains.ki, ..found.gains };
+            let open = OpenLoop::of_parallel(&model, &gains);
+            if analyze_loop(&open).ms.is_none_or(|ms| ms > limits.ms) {
+                continue;
+            }
+            let iae =
+                loop_response(&open, excitation, &ResponseOptions::default()).metrics().expect("figures").iae;
+            assert!(iae >= found.value * (1.0 - 1e-4), "{objective:?} {p} {i}: {iae} {}", found.value);
+        }
+    }
+}
