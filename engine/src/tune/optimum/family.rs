@@ -42,8 +42,12 @@ impl<'a> Family<'a> {
         self.points.push(omega, g);
     }
 
-    /// Halves the distances between the points of a plant.
+    /// Halves the distances between the points of a plant, a few times at most.
     pub fn refine(&mut self, plant: usize) {
+        const MOST: u32 = 4;
+        if self.halvings[plant] >= MOST {
+            return;
+        }
         let start = if plant == 0 { 0 } else { self.ends[plant - 1] };
         let own: Vec<f64> = self.points.omega[start..self.ends[plant]].to_vec();
         self.halvings[plant] += 1;

@@ -101,6 +101,11 @@ impl Spot for AtGain {
 }
 
 impl<'a, 'b> Task<'a, 'b> {
+    /// Whether the loops of these gains are stable, by the exact criterion.
+    fn is_stable(&self, at: &AtGain) -> bool {
+        self.family.is_stable(self.shaped.lead, at.kp, at.ki)
+    }
+
     fn new(on: &Ground<'a, 'b>, lead: Lead) -> Self {
         let plain = |p: &super::points::Plant<'_>| p.excess <= 1 && p.dead_time_s == 0.0;
         let family = on.family;
@@ -200,11 +205,18 @@ impl GainSearch {
 
     /// Looks at every gain of a grid, then about the best of them.
     fn over(&mut self, task: &Task<'_, '_>, grid: &[f64], width: f64, endless: bool) -> Found {
-        let seen: Vec<AtGain> = grid.iter().map(|&kp| self.at(task, kp)).collect();
+        let mut seen: Vec<AtGain> = grid.iter().map(|&kp| self.at(task, kp)).collect();
         if seen.iter().any(|s| s.value == f64::NEG_INFINITY) {
             return Found::Unbounded;
         }
         let mut best: Option<AtGain> = None;
+        // The points end at a lowest frequency: a loop slower than that is stable on them whatever its Ki.
+        while let Some(lowest) = seen.iter_mut().min_by(|a, b| a.value.total_cmp(&b.value))
+            && lowest.value.is_finite()
+            && !task.is_stable(lowest)
+        {
+            lowest.value = f64::INFINITY;
+        }
         let least = seen.iter().map(|s| s.value).fold(f64::INFINITY, f64::min);
         for (i, middle) in seen.iter().enumerate() {
             let lower =
@@ -219,7 +231,13 @@ impl GainSearch {
             }
             let left = seen[i.saturating_sub(1)];
             let right = seen[(i + 1).min(seen.len() - 1)];
-            let found = valley(&mut |kp| self.at(task, kp), left, *middle, right, width);
+            if !task.is_stable(middle) {
+                continue;
+            }
+            let mut found = valley(&mut |kp| self.at(task, kp), left, *middle, right, width);
+            if !task.is_stable(&found) {
+                found = *middle;
+            }
             if best.is_none_or(|b| found.value < b.value) {
                 best = Some(found);
             }

@@ -16,6 +16,7 @@ const RATIO_FAR: f64 = 1.35;
 const RIPPLES_RAD: f64 = 20.0;
 /// How far below the lowest and above the highest frequency of a process its limits are taken to rule.
 const BELOW: f64 = 100.0;
+const BELOW_INTEGRATOR: f64 = 1e4;
 const ABOVE: f64 = 60.0;
 
 /// Frequencies with what the search needs of G there.
@@ -161,7 +162,8 @@ impl<'a> Plant<'a> {
         let theta = self.dead_time_s;
         let ripples_end = if theta > 0.0 { RIPPLES_RAD / theta } else { 0.0 };
         let stop = (last * ABOVE).max(ripples_end).min(self.known_up_to());
-        let mut omega = first / BELOW;
+        // How slow the loop of an integrator is its gain alone decides.
+        let mut omega = first / if self.low.power < 0 { BELOW_INTEGRATOR } else { BELOW };
         while omega < stop {
             to.push(omega, sign * self.at_omega(omega));
             let near = omega < ripples_end.max(4.0 * last) && omega > 0.25 * first;
