@@ -13,6 +13,7 @@ mod fit_plant;
 mod identify;
 mod json;
 mod model;
+mod optimal;
 pub mod parse;
 mod parse_gains;
 mod point;
@@ -39,6 +40,7 @@ Examples:
   vasos identify step.csv --pv h2 --mv u --json
   vasos fit-plant stad log.csv --input u=u_v --output h3=h3_cm --fit FV03.k90=20..150
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
+  vasos tune --model K=4.9,T=152,L=2 --optimal --ms 1.4 --controller pi
   vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
   vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series
   vasos experiment stad_figure_7";
@@ -69,7 +71,7 @@ pub enum Command {
     Identify(identify::Arguments),
     /// Fit parameters of a rig to a recording: the tank network's own laws, simulated in free run.
     FitPlant(fit_plant::Arguments),
-    /// Tune a controller for a model by published rules.
+    /// Tune a controller for a model: by published rules, or the best under limits of robustness.
     Tune(tune::Arguments),
     /// Judge a controller on a model: stability, margins, sensitivities, responses.
     Analyze(analyze::Arguments),

@@ -8,7 +8,7 @@ use vasos_engine::tune::{
 };
 
 use super::json::{self, shown, table};
-use super::{Answer, Refusal, parse};
+use super::{Answer, Refusal, optimal, parse};
 
 /// Arguments of `vasos tune`.
 #[derive(Debug, clap::Args)]
@@ -16,39 +16,51 @@ use super::{Answer, Refusal, parse};
 Examples:
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pid --json
   vasos tune --model Kv=0.03,L=2 --rule all
+  vasos tune --model K=4.9,T=152,L=2 --optimal --ms 1.4 --controller pi --json
+  vasos tune --model K=4.9,T=152,L=2 --model K=4.2,T=110,L=2.6 --optimal --ms 1.6 --ju 20 --controller pid
 A rule without --controller gives the richest one it has; --rule all then gives every one.
-Exit status 1: the rule has no answer for this model.")]
+Exit status 1: the rule has no answer for this model, or no controller meets the limits (the floor is said).")]
 pub struct Arguments {
-    /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..
-    #[arg(long, allow_hyphen_values = true)]
-    model: String,
+    /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..; several
+    /// times for an optimum over the worst of them.
+    #[arg(long, required = true, allow_hyphen_values = true)]
+    model: Vec<String>,
     /// Name of a rule, or all.
     #[arg(long, required_unless_present = "optimal", conflicts_with = "optimal")]
     rule: Option<String>,
-    /// Not available yet: the best gains under limits of robustness.
+    /// The best gains under limits on Ms, Mt and Ju; without any limit Ms is 1.4.
     #[arg(long)]
     optimal: bool,
     /// p, pi, pd or pid.
     #[arg(long)]
-    controller: Option<String>,
+    pub(super) controller: Option<String>,
     /// Closed-loop time constant (τc or λ) in seconds, for the rules that have one.
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     tau_c: Option<f64>,
     /// Ku=..,Pu=.. from a test, for the rules that start from them.
     #[arg(long, value_name = "Ku=..,Pu=..", allow_hyphen_values = true)]
     ultimate: Option<String>,
-    /// Not available yet: limits and objective of the optimum.
-    #[arg(long, hide = true, value_name = "X", requires = "optimal")]
-    objective: Option<String>,
-    #[arg(long, hide = true, requires = "optimal")]
-    ms: Option<f64>,
-    #[arg(long, hide = true, requires = "optimal")]
-    mt: Option<f64>,
-    #[arg(long, hide = true, requires = "optimal")]
-    ju: Option<f64>,
+    /// What to make best: jv (least, the default), max-ki, iae-load, iae-setpoint.
+    #[arg(long, value_name = "WHAT", requires = "optimal")]
+    pub(super) objective: Option<String>,
+    /// Largest Ms = max |1/(1 + L)|, greater than 1.
+    #[arg(long, value_name = "X", requires = "optimal", allow_hyphen_values = true)]
+    pub(super) ms: Option<f64>,
+    /// Largest Mt = max |L/(1 + L)|, 1 or more.
+    #[arg(long, value_name = "X", requires = "optimal", allow_hyphen_values = true)]
+    pub(super) mt: Option<f64>,
+    /// Largest Ju = max |C/(1 + L)|, in MV units per PV unit.
+    #[arg(long, value_name = "X", requires = "optimal", allow_hyphen_values = true)]
+    pub(super) ju: Option<f64>,
+    /// N of the derivative filter Td/N of an optimal PID, or free; free where Ju is limited, else 10.
+    #[arg(long, value_name = "N", requires = "optimal")]
+    pub(super) filter: Option<String>,
+    /// Overshoot of a setpoint step in percent, for which the weight b (and a setpoint filter, if need be) is chosen.
+    #[arg(long, value_name = "PERCENT", requires = "optimal", allow_hyphen_values = true)]
+    pub(super) overshoot: Option<f64>,
     /// Print JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// A rule applied, and its loop analysed.
@@ -59,33 +71,37 @@ struct Applied {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
+    let models = arguments.model.iter().map(|m| parse::model(m)).collect::<Result<Vec<_>, _>>();
+    let models = models.map_err(Refusal::of)?;
     if arguments.optimal {
-        return Err(Refusal::later("vasos tune --optimal"));
+        return optimal::run(arguments, &models);
     }
-    let model = parse::model(&arguments.model).map_err(Refusal::of)?;
+    let [model] = models.as_slice() else {
+        return Err(Refusal("rules take one model: leave one, or ask for --optimal".to_owned()));
+    };
     let ultimate = arguments.ultimate.as_deref().map(parse::ultimate).transpose().map_err(Refusal::of)?;
     let options = RuleOptions { tau_c_s: arguments.tau_c, ultimate, ..RuleOptions::default() };
     let kind = arguments.controller.as_deref().map(controller).transpose()?;
     let name = arguments.rule.as_deref().unwrap_or_default();
     let worth = |tuning: Tuning| {
-        let analysis = analyze(&model, &tuning.gains);
+        let analysis = analyze(model, &tuning.gains);
         (tuning, analysis)
     };
     let applied: Vec<Applied> = if name == "all" {
         let wanted = |k: ControllerKind| kind.is_none_or(|wanted| wanted == k);
-        let all = tune_all(&model, &options).into_iter().filter(|(_, k, _)| wanted(*k));
+        let all = tune_all(model, &options).into_iter().filter(|(_, k, _)| wanted(*k));
         all.map(|(rule, kind, tuned)| Applied { rule, kind, outcome: tuned.map(worth) }).collect()
     } else {
         let rule = find_rule(name, kind.unwrap_or(ControllerKind::Pid)).ok_or_else(|| unknown_rule(name))?;
         let richest = || rule.controllers.iter().copied().max_by_key(|k| k.id().len());
         let kind = kind.or_else(richest).unwrap_or(ControllerKind::Pi);
-        let outcome = rule.tune(&model, kind, &options).map(worth);
+        let outcome = rule.tune(model, kind, &options).map(worth);
         vec![Applied { rule, kind, outcome }]
     };
-    answer(arguments.json, &model, &applied)
+    answer(arguments.json, model, &applied)
 }
 
-fn controller(name: &str) -> Result<ControllerKind, Refusal> {
+pub(super) fn controller(name: &str) -> Result<ControllerKind, Refusal> {
     ControllerKind::from_id(name)
         .ok_or_else(|| Refusal(format!("there is no controller '{name}': choose p, pi, pd or pid")))
 }

@@ -231,15 +231,6 @@ impl<'a> Solver<'a> {
                 Found::Nothing => return Ok(None),
             };
             let check = self.check(objective, &candidate)?;
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "{round} {objective:?} {:?} {candidate:?} {:?} {:?} {}",
-                    self.limits,
-                    check.excess,
-                    check.unstable,
-                    self.family.points.len()
-                );
-            }
             if !check.unstable.is_empty() {
                 // A window narrower than the points: closer ones everywhere.
                 check.unstable.iter().for_each(|plant| self.family.refine(*plant));
