@@ -1,6 +1,10 @@
 //! What a fit of any structure says, and how far it can be trusted.
 
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fopdt::Interval;
 use super::parameters::{Coordinates, Parameter};
@@ -99,6 +103,32 @@ impl ModelFit {
     #[must_use]
     pub fn is_usable(&self) -> bool {
         !self.verdicts.iter().any(FitVerdict::is_refusal)
+    }
+
+    /// Models drawn from what the stretch leaves open: the parameters' joint normal distribution in the coordinates of the
+    /// search, ln T for a time constant, a dead time cut at 0.
+    ///
+    /// Same seed, same models. `None` where a parameter is not known at all, or the model is another kind's.
+    #[must_use]
+    pub fn draws(&self, count: usize, seed: u64) -> Option<Vec<ProcessModel>> {
+        let c = &self.coordinates;
+        let n = c.values.len();
+        let covariance = DMatrix::from_fn(n, n, |i, j| c.covariance.at(i, j));
+        if covariance.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        // By eigenvalues, because a covariance that rounding has made indefinite has no Cholesky factor.
+        let eigen = covariance.symmetric_eigen();
+        let scales = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let one = |_| {
+            let z = DVector::from_fn(n, |i, _| scales[i] * normal());
+            let away = &eigen.eigenvectors * z;
+            let values: Vec<f64> = c.values.iter().zip(away.iter()).map(|(v, d)| v + d).collect();
+            c.model_at(&values).ok()
+        };
+        (0..count).map(one).collect()
     }
 
     /// Response of the PV to a unit step of the MV with its pointwise 95 % band: (lower, value, upper) at each time,

@@ -12,6 +12,7 @@ mod real_rig;
 mod scenario;
 mod scenario_event;
 mod start;
+mod trial;
 mod watch;
 
 pub use active_loop::{ActiveLoop, LoopTarget};
@@ -26,3 +27,4 @@ pub use scenario::{
 };
 pub use scenario_event::ScenarioEvent;
 pub use start::{StartError, check_starts};
+pub use trial::{Trial, TrialRun, run_trial};

@@ -15,6 +15,7 @@ mod registry;
 mod rule;
 mod setpoint_side;
 mod shape;
+mod spread;
 mod ultimate;
 mod warning;
 
@@ -24,5 +25,6 @@ pub use kind::ControllerKind;
 pub use registry::{find_rule, registry, tune_all};
 pub use rule::{Aim, Purpose, RatioRange, Rule, RuleOptions, Tuning};
 pub use setpoint_side::{SetpointSide, setpoint_side};
+pub use spread::{Quantiles, TuningSpread, tuning_spread};
 pub use ultimate::{Ultimate, ultimate};
 pub use warning::RuleWarning;

@@ -17,6 +17,7 @@ mod certificate;
 mod error;
 mod family;
 mod floor;
+mod front;
 mod gain_search;
 mod lead_search;
 mod points;
@@ -28,5 +29,6 @@ mod valley;
 
 pub use certificate::{Certificate, Limit, Optimum};
 pub use error::OptimumError;
+pub use front::{FrontPoint, TradeOff, front, on_front};
 pub use problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
 pub use solve::optimum;
