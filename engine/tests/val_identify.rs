@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{
-    FitError, FitOptions, FitProblem, FitVerdict, FopdtFit, LoopRecord, RecordFinding, Structure,
+    FitError, FitOptions, FitProblem, FitVerdict, FopdtFit, LoopRecord, ModeColumn, RecordFinding, Structure,
     StudyOptions, fit_fopdt, fit_model, simulate_fopdt, study_loop,
 };
 use vasos_engine::model::Fopdt;
@@ -318,7 +318,7 @@ fn val_garbage_never_panics() {
             Err(error) => assert!(!error.to_string().is_empty()),
         }
         let record =
-            LoopRecord { problem: FitProblem::new(&time_s, &pv, &mv), sp: Some(&pv), mode: Some(&mv) };
+            LoopRecord { problem: FitProblem::new(&time_s, &pv, &mv), sp: Some(&pv), mode: Some(ModeColumn::of_numbers(&mv)) };
         if let Ok(study) = study_loop(&record, &StudyOptions::default())
             && let Ok(choice) = study.choice
         {

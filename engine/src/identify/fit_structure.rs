@@ -123,7 +123,7 @@ fn profile_dead_times(
     }
 }
 
-fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
+pub(super) fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
     let (main, other) = match structure {
         Structure::Fopdt => (Order::First, Order::First),
         Structure::Ipdt => (Order::Integrator, Order::Integrator),
@@ -231,7 +231,7 @@ fn taken(whole: Option<&Symmetric>, places: &[usize], variance: f64) -> Symmetri
 }
 
 /// Free run ŷ on every row, and the residuals of those that count.
-fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
     let mut simulated = Vec::with_capacity(stretch.len());
     let mut residuals = Vec::with_capacity(stretch.len());
     let whole = Stretch { keep: None, ..stretch.clone() };

@@ -50,5 +50,7 @@ pub use residual_tests::ResidualTests;
 pub use rest::choose_from_rest;
 pub use simulate::simulate_fopdt;
 pub use structure::Structure;
-pub use study::{ControllerFit, LoopRecord, LoopStudy, Oscillation, RecordFinding, StudyOptions, study_loop};
+pub use study::{
+    ControllerFit, LoopRecord, LoopStudy, ModeColumn, Oscillation, RecordFinding, StudyOptions, study_loop,
+};
 pub use verdict::FitVerdict;
