@@ -15,7 +15,14 @@ struct Record {
 }
 
 /// A record by hand: `hand` over time, with a first order behind it.
-fn by_hand(gain: f64, t_s: f64, dead_time: usize, noise: f64, seed: u64, hand: impl Fn(f64) -> f64) -> Record {
+fn by_hand(
+    gain: f64,
+    t_s: f64,
+    dead_time: usize,
+    noise: f64,
+    seed: u64,
+    hand: impl Fn(f64) -> f64,
+) -> Record {
     let mut rng = StdRng::seed_from_u64(seed);
     let a = f64::exp(-1.0 / t_s);
     let mut out = Record { time_s: vec![], pv: vec![], mv: vec![], sp: vec![] };
@@ -33,7 +40,6 @@ fn by_hand(gain: f64, t_s: f64, dead_time: usize, noise: f64, seed: u64, hand: i
     }
     out
 }
-
 
 fn study(r: &Record, mode: Option<ModeColumn>) -> LoopStudy {
     let mut problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);
@@ -101,5 +107,9 @@ fn an_mv_of_few_levels_has_no_limits() {
     }
     let r = by_hand(1.0, 20.0, 2, 0.02, 1, |t| 3.0 * levels[(t as usize / 2).min(899)]);
     let found = study(&r, None);
-    assert!(!found.findings.iter().any(|f| matches!(f, RecordFinding::MvAtLimit { .. })), "{:?}", found.findings);
+    assert!(
+        !found.findings.iter().any(|f| matches!(f, RecordFinding::MvAtLimit { .. })),
+        "{:?}",
+        found.findings
+    );
 }

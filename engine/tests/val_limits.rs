@@ -97,8 +97,28 @@ fn truths() -> Vec<Tight> {
         base,
         Tight { kc: 4.0, square: (10.0, 200), limits: [34.0, 50.0], ..base },
         Tight { kc: 5.0, square: (8.0, 150), limits: [36.0, 47.0], ..base },
-        Tight { gain: 0.5, time_constant_s: 60.0, dead_time_s: 8, kc: 8.0, ti_s: 60.0, square: (4.0, 250), limits: [30.0, 52.0], noise: 0.02, rows: 3000 },
-        Tight { gain: 5.0, time_constant_s: 25.0, dead_time_s: 3, kc: 1.0, ti_s: 25.0, square: (20.0, 120), limits: [38.0, 46.0], noise: 0.2, rows: 1500 },
+        Tight {
+            gain: 0.5,
+            time_constant_s: 60.0,
+            dead_time_s: 8,
+            kc: 8.0,
+            ti_s: 60.0,
+            square: (4.0, 250),
+            limits: [30.0, 52.0],
+            noise: 0.02,
+            rows: 3000,
+        },
+        Tight {
+            gain: 5.0,
+            time_constant_s: 25.0,
+            dead_time_s: 3,
+            kc: 1.0,
+            ti_s: 25.0,
+            square: (20.0, 120),
+            limits: [38.0, 46.0],
+            noise: 0.2,
+            rows: 1500,
+        },
         Tight { limits: [0.0, 48.0], ..base },
     ]
 }
@@ -140,7 +160,8 @@ fn the_uncertainty_of_limits_is_in_the_intervals() {
     let truth = Tight::default();
     let r = truth.run(1);
     let half = |study: &LoopStudy, name: &str| {
-        let p = study.choice.as_ref().expect("a model").chosen().parameter(name).expect("a parameter").clone();
+        let p =
+            study.choice.as_ref().expect("a model").chosen().parameter(name).expect("a parameter").clone();
         0.5 * (p.interval_95[1] - p.interval_95[0])
     };
     let problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);

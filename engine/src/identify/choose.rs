@@ -29,6 +29,19 @@ impl Choice {
         }
     }
 
+    /// Takes back that a fit is poor where noise of this standard deviation, in PV units, is all that it leaves.
+    pub(crate) fn weigh_noise(&mut self, noise_sd: f64) {
+        /// What a drift or a converter may add to the noise heard at rest.
+        const ROOM: f64 = 1.3;
+        for fit in self.fits.iter_mut().filter(|fit| fit.mse.sqrt() < ROOM * noise_sd) {
+            for verdict in &mut fit.verdicts {
+                if let FitVerdict::Poor { fit_percent } = *verdict {
+                    *verdict = FitVerdict::Noisy { fit_percent };
+                }
+            }
+        }
+    }
+
     /// The fit chosen.
     #[must_use]
     pub fn chosen(&self) -> &ModelFit {
@@ -89,7 +102,8 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     let mut order: Vec<(bool, f64, ModelFit)> =
         fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let enough = (0..order.len()).filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG);
+    let enough =
+        (0..order.len()).filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG);
     if let Some(simplest) = enough.min_by_key(|&i| order[i].2.unknowns) {
         order[..=simplest].rotate_right(1);
     }
@@ -112,7 +126,8 @@ fn cancels(fit: &ModelFit) -> bool {
     const ALIKE: f64 = 0.1;
     let (Some(zero), true) = (fit.parameter("Tz_s"), fit.parameter("T2_s").is_some()) else { return false };
     ["T_s", "T2_s"].iter().filter_map(|name| fit.parameter(name)).any(|pole| {
-        let apart = zero.interval_95[0].max(pole.interval_95[0]) > zero.interval_95[1].min(pole.interval_95[1]);
+        let apart =
+            zero.interval_95[0].max(pole.interval_95[0]) > zero.interval_95[1].min(pole.interval_95[1]);
         (zero.value / pole.value - 1.0).abs() < ALIKE || !apart
     })
 }

@@ -96,11 +96,12 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     let found = deepest(&stretch, 1, &shape, &starts, VALLEYS[1]);
     let best = without_idle(&stretch, &shape, found.first()?.clone());
     // What a larger model explains without limits is no sign of any.
-    let without = [(Structure::Fopdt, FALL), (Structure::SopdtZero, FALL_OF_LARGER)].map(|(structure, part)| {
-        let shape = shape_of(&stretch, structure, false);
-        let fit = search(&stretch, &shape, &Near::default(), &mut Work::default());
-        part * fit.map_or(f64::INFINITY, |f| f.rss())
-    });
+    let without =
+        [(Structure::Fopdt, FALL), (Structure::SopdtZero, FALL_OF_LARGER)].map(|(structure, part)| {
+            let shape = shape_of(&stretch, structure, false);
+            let fit = search(&stretch, &shape, &Near::default(), &mut Work::default());
+            part * fit.map_or(f64::INFINITY, |f| f.rss())
+        });
     // A limit beyond which next to nothing lies is none.
     let beyond = problem.mv.iter().filter(|u| !(best.limits[0]..=best.limits[1]).contains(*u)).count();
     (best.rss < without[0].min(without[1]) && 100 * beyond > problem.mv.len()).then(|| {

@@ -59,7 +59,8 @@ pub(super) fn descend(
         let slopes = Slopes::of(stretch, factor, shape, &best)?;
         let step = slopes.step();
         let variance = slopes.variance(shape, &best);
-        if (0..2).all(|i| step[i].abs() <= STEP_IN_STANDARD_ERRORS * (variance / slopes.square[i][i]).sqrt()) {
+        if (0..2).all(|i| step[i].abs() <= STEP_IN_STANDARD_ERRORS * (variance / slopes.square[i][i]).sqrt())
+        {
             break;
         }
         let trial = SHARES.iter().find_map(|share| {
@@ -119,9 +120,8 @@ struct Slopes {
 
 impl Slopes {
     fn of(stretch: &Stretch, factor: usize, shape: &Shape, at: &LimitsFit) -> Option<Self> {
-        let residuals_of = |limits: [f64; 2], found: &Found| {
-            free_run(&clipped(stretch, limits, factor), shape, found).1
-        };
+        let residuals_of =
+            |limits: [f64; 2], found: &Found| free_run(&clipped(stretch, limits, factor), shape, found).1;
         let residuals = residuals_of(at.limits, &at.found);
         let width = at.limits[1] - at.limits[0];
         let whole = range(&stretch.u);

@@ -197,7 +197,8 @@ fn solve(rows: &[Move], wanted: &[bool; COUNT]) -> Option<Solved> {
         }
     }
     let inverse = matrix.inverse()?;
-    let mut out = Solved { values: [0.0; COUNT], errors: [0.0; COUNT], cross: [0.0; COUNT], r2: 0.0, miss: 0.0 };
+    let mut out =
+        Solved { values: [0.0; COUNT], errors: [0.0; COUNT], cross: [0.0; COUNT], r2: 0.0, miss: 0.0 };
     for (a, &i) in places.iter().enumerate() {
         out.values[i] = (0..size).map(|b| inverse.at(a, b) * rhs[b]).sum();
     }

@@ -24,8 +24,7 @@ pub use mode::ModeColumn;
 pub use stiction::Oscillation;
 
 use super::{
-    Choice, FitError, FitProblem, ReactionCurve, ReactionCurveError, Structure, choose_among,
-    reaction_curve,
+    Choice, FitError, FitProblem, ReactionCurve, ReactionCurveError, Structure, choose_among, reaction_curve,
 };
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;

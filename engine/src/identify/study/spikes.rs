@@ -43,7 +43,11 @@ pub(super) fn spikes(pv: &[f64], keep: &[bool]) -> Vec<usize> {
             let is_out = |j: &usize| (values[*j] - middle[i]).abs() > 0.5 * distance[i];
             let calm: Vec<usize> = around.clone().filter(|j| !is_out(j)).collect();
             let both = calm.first().is_some_and(|j| *j < i) && calm.last().is_some_and(|j| *j > i);
-            both && around.len() - calm.len() <= ROWS && leaves_line(&values, &calm, i, sigma)
+            // A swing leaves its middle on both sides.
+            let side = values[i] - middle[i];
+            let mut out = around.clone().filter(is_out);
+            let one_side = out.all(|j| (values[j] - middle[i]) * side > 0.0);
+            both && one_side && around.len() - calm.len() <= ROWS && leaves_line(&values, &calm, i, sigma)
         }
     };
     let found: Vec<usize> = (0..values.len()).filter(|&i| stands_out(i)).map(|i| rows[i]).collect();
@@ -55,9 +59,9 @@ fn leaves_line(values: &[f64], others: &[usize], row: usize, sigma: f64) -> bool
     let n = others.len() as f64;
     let x = |j: usize| j as f64 - row as f64;
     let (mx, my) = others.iter().fold((0.0, 0.0), |(a, b), &j| (a + x(j) / n, b + values[j] / n));
-    let (xx, xy) = others.iter().fold((0.0, 0.0), |(a, b), &j| {
-        (a + (x(j) - mx).powi(2), b + (x(j) - mx) * (values[j] - my))
-    });
+    let (xx, xy) = others
+        .iter()
+        .fold((0.0, 0.0), |(a, b), &j| (a + (x(j) - mx).powi(2), b + (x(j) - mx) * (values[j] - my)));
     let slope = if xx > 0.0 { xy / xx } else { 0.0 };
     let off = |j: usize| values[j] - my - slope * (x(j) - mx);
     let scatter = (others.iter().map(|&j| off(j).powi(2)).sum::<f64>() / n).sqrt();
@@ -93,7 +97,8 @@ mod tests {
                 for (name, shape) in
                     [("swing", &swing as &dyn Fn(usize) -> f64), ("burst", &burst), ("ring", &ring)]
                 {
-                    let pv: Vec<f64> = noise.iter().enumerate().map(|(k, e)| 40.0 + 5.0 * shape(k) + e).collect();
+                    let pv: Vec<f64> =
+                        noise.iter().enumerate().map(|(k, e)| 40.0 + 5.0 * shape(k) + e).collect();
                     assert_eq!(found(&pv), [0; 0], "{name} of {period} rows, seed {seed}");
                 }
             }
@@ -119,7 +124,9 @@ mod tests {
                 let mut pv: Vec<f64> = noise
                     .iter()
                     .enumerate()
-                    .map(|(k, e)| 5.0 * (std::f64::consts::TAU * k as f64 / period).sin() + 0.01 * k as f64 + e)
+                    .map(|(k, e)| {
+                        5.0 * (std::f64::consts::TAU * k as f64 / period).sin() + 0.01 * k as f64 + e
+                    })
                     .collect();
                 for row in rows {
                     pv[row] += 6.0;
