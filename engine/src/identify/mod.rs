@@ -15,6 +15,7 @@
 //! before the stamp. Policy for non-finite numbers: a row that holds one is refused with its number.
 
 mod choose;
+mod damped;
 mod error;
 mod fit_structure;
 mod fopdt;
