@@ -102,8 +102,10 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     let mut order: Vec<(bool, f64, ModelFit)> =
         fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let enough =
-        (0..order.len()).filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG);
+    let enough = (0..order.len())
+        .filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG)
+        // What still follows the MV is in the process, however little it weighs.
+        .filter(|&i| order[0].2.tests.follows_input() || !order[i].2.tests.follows_input());
     if let Some(simplest) = enough.min_by_key(|&i| order[i].2.unknowns) {
         order[..=simplest].rotate_right(1);
     }

@@ -20,7 +20,7 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
     if fit.fit_percent < POOR_PERCENT {
         let fit_percent = fit.fit_percent;
         // White residuals leave another structure nothing to explain.
-        found.push(if fit.tests.is_white() && half_percent(&fit.parameters[0]) < 100.0 {
+        found.push(if fit.tests.is_white() && half_percent(&fit.parameters[0]) < GAIN_KNOWN_PERCENT {
             FitVerdict::Noisy { fit_percent }
         } else {
             FitVerdict::Poor { fit_percent }

@@ -84,12 +84,15 @@ pub(super) fn is_by_hand(
     const ROUNDING: f64 = 1e-9;
     /// A typical row, the corners of a motion left aside, must follow from the past this much better.
     const TYPICAL: f64 = 0.5;
+    /// A law that explains this part of the moves is at work, however long the MV rests between them.
+    const EXACT: f64 = 0.95;
     let h_s = sample_time(problem.time_s);
     if !fits.iter().any(|fit| explains(fit, h_s)) {
         return false;
     }
     let Some(own) = OwnPast::of(mv, controller.stride) else { return false };
-    own.part <= (1.0 - controller.r2) + ROUNDING || own.miss < TYPICAL * controller.miss
+    let between_corners = controller.r2 < EXACT && own.miss < TYPICAL * controller.miss;
+    between_corners || own.part <= (1.0 - controller.r2) + ROUNDING
 }
 
 /// Whether a process without a zero explains the PV, to its noise or nearly, and lags the MV.
