@@ -44,7 +44,12 @@ pub(super) fn find(
         }
         None => choose(read),
     };
-    let still = columns.is_empty().then(|| still_clock(read)).flatten().or_else(|| {
+    // A PV that rises evenly passes for a clock; a column named as one goes before.
+    let by_behaviour = options.time_column.is_none()
+        && columns
+            .first()
+            .is_none_or(|&i| read.columns[i].kind == Kind::Number && !is_time_name(&read.names[i]));
+    let still = by_behaviour.then(|| still_clock(read)).flatten().or_else(|| {
         let first = *columns.first()?;
         (columns.len() == 1 && stands_still(&read.columns[first].values)).then_some(first)
     });
