@@ -316,3 +316,72 @@ fn bad_input_ends_with_2_and_says_what_to_do() {
         assert!(status == 2 && said.contains(word), "{arguments:?}: {status} {said}");
     }
 }
+
+fn log_file(name: &str, text: &str) -> String {
+    let path = scratch(name);
+    std::fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
+/// Every row with one stamp was read as a log without a time column, with a note and status 0.
+#[test]
+fn a_clock_that_stands_still_is_an_error() {
+    let rows: String = (0..60).map(|k| format!("7,{},{}\n", f64::from(k).sqrt(), u8::from(k > 9))).collect();
+    let log = log_file("still_clock.csv", &format!("time,pv,mv\n{rows}"));
+    let (status, said) = refused(&["identify", &log, "--pv", "pv", "--mv", "mv"]);
+    assert!(
+        status == 2 && said.contains("all 60 rows carry the same time in column 'time'"),
+        "{status}: {said}"
+    );
+    let (status, _) = refused(&["identify", &log, "--pv", "pv", "--mv", "mv", "--sample-time", "1"]);
+    assert_ne!(status, 2);
+}
+
+#[test]
+fn a_stretch_that_ends_before_it_begins_is_named() {
+    let rows: String =
+        (0..60).map(|k| format!("{k},{},{}\n", f64::from(k).sqrt(), u8::from(k > 9))).collect();
+    let log = log_file("short.csv", &format!("time,pv,mv\n{rows}"));
+    let (status, said) =
+        refused(&["identify", &log, "--pv", "pv", "--mv", "mv", "--from", "900", "--to", "100"]);
+    assert!(status == 2 && said.contains("--from 900 must be less than --to 100"), "{status}: {said}");
+}
+
+/// A negative amplitude was taken for an unknown option.
+#[test]
+fn a_negative_relay_is_answered_with_its_range() {
+    let (status, said) = refused(&["excite", "stad", "--loop", "LIC-02", "--relay", "-0.3"]);
+    assert!(
+        status == 2 && said.contains("amplitude") && !said.contains("unexpected argument"),
+        "{status}: {said}"
+    );
+}
+
+/// A mode in words was shown by its code.
+#[test]
+fn a_mode_in_words_is_said_in_words() {
+    let rows: String = (0..400)
+        .map(|k: u32| {
+            let word = if k < 200 { "AUTO" } else { "MAN" };
+            let mv = 50.0 + 5.0 * (f64::from(k) / 9.0).sin();
+            format!("{k},{},{mv},{word}\n", 20.0 + (f64::from(k) / 9.0 - 1.0).sin())
+        })
+        .collect();
+    let log = log_file("modes.csv", &format!("time,pv,mv,mode\n{rows}"));
+    let output = vasos(&["identify", &log, "--pv", "pv", "--mv", "mv", "--mode", "mode"]);
+    let said = String::from_utf8(output.stdout).expect("text");
+    assert!(said.contains("read in mode AUTO"), "{said}");
+}
+
+/// Values of 1e200 gave models with infinities in their sentences.
+#[test]
+fn values_beyond_all_scales_are_refused() {
+    for scale in [1e200, 1e-200] {
+        let rows: String = (0..60)
+            .map(|k| format!("{k},{:e},{}\n", scale * (1.0 + f64::from(k).sqrt()), u8::from(k > 9)))
+            .collect();
+        let log = log_file("scale.csv", &format!("time,pv,mv\n{rows}"));
+        let (status, said) = refused(&["identify", &log, "--pv", "pv", "--mv", "mv"]);
+        assert!(status == 2 && said.contains("choose a unit") && !said.contains('∞'), "{status}: {said}");
+    }
+}

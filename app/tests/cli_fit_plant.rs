@@ -76,3 +76,11 @@ fn what_is_wrong_is_bad_input_with_the_reason() {
     let bare = vasos(&["fit-plant", "cascade", &log, "--input", "u=u_v", "--output", "h2=h2_v"]);
     assert!(String::from_utf8_lossy(&bare.stderr).contains("[fit]"));
 }
+
+/// A rig that cannot follow the record was answered with status 0.
+#[test]
+fn a_hopeless_fit_is_a_no() {
+    let output = fit(&["--input", "pump=u_v", "--output", "h2=8-h2_v"]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said} {}", String::from_utf8_lossy(&output.stderr));
+}

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vasos_engine::explain::Explain;
 use vasos_engine::identify::{
-    FitError, FitOptions, FitProblem, FitVerdict, FopdtFit, LoopRecord, RecordFinding, Structure,
+    FitError, FitOptions, FitProblem, FitVerdict, FopdtFit, LoopRecord, ModeColumn, RecordFinding, Structure,
     StudyOptions, fit_fopdt, fit_model, simulate_fopdt, study_loop,
 };
 use vasos_engine::model::Fopdt;
@@ -317,8 +317,11 @@ fn val_garbage_never_panics() {
             Ok(fit) => assert!(fit.model.gain.is_finite() && fit.model.time_constant_s > 0.0, "case {case}"),
             Err(error) => assert!(!error.to_string().is_empty()),
         }
-        let record =
-            LoopRecord { problem: FitProblem::new(&time_s, &pv, &mv), sp: Some(&pv), mode: Some(&mv) };
+        let record = LoopRecord {
+            problem: FitProblem::new(&time_s, &pv, &mv),
+            sp: Some(&pv),
+            mode: Some(ModeColumn::of_numbers(&mv)),
+        };
         if let Ok(study) = study_loop(&record, &StudyOptions::default())
             && let Ok(choice) = study.choice
         {

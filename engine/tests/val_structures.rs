@@ -233,3 +233,34 @@ fn a_drift_is_taken_out_where_there_is_one() {
         assert!((fit.parameter("K").expect("K").value - 2.0).abs() < 0.03, "{:?}", fit.parameters);
     }
 }
+
+/// A binary sequence in noise had a second order with a zero chosen whose zero cancelled its second time constant, in four
+/// records of eight.
+#[test]
+fn val_a_first_order_in_noise_is_not_given_a_pole_and_a_zero_that_cancel() {
+    for (gain, t_s, dead_time) in [(2.0, 40.0, 5), (1.0, 15.0, 2), (-3.0, 80.0, 12)] {
+        for seed in 0_u32..8 {
+            let mut rng = StdRng::seed_from_u64(seed.into());
+            let (mut register, mut u, mut y) = (0x1fd_u32 - seed, 1.0, 0.0);
+            let a = f64::exp(-1.0 / t_s);
+            let mut delayed = vec![0.0; dead_time + 1];
+            let (mut time_s, mut pv, mut mv) = (vec![], vec![], vec![]);
+            for k in 0..1500 {
+                if k % 12 == 0 {
+                    let bit = (register ^ (register >> 4)) & 1;
+                    register = (register >> 1) | (bit << 8);
+                    u = if register & 1 == 1 { 1.0 } else { -1.0 };
+                }
+                let draw: f64 = StandardNormal.sample(&mut rng);
+                time_s.push(f64::from(k));
+                pv.push(y + 0.3 * draw);
+                mv.push(u);
+                delayed.push(u);
+                y = a * y + (1.0 - a) * gain * delayed[delayed.len() - 1 - dead_time];
+            }
+            let choice = choose_model(&FitProblem::new(&time_s, &pv, &mv)).expect("fits");
+            let fit = choice.chosen();
+            assert_eq!(fit.structure, Structure::Fopdt, "K {gain}, seed {seed}: {:?}", fit.parameters);
+        }
+    }
+}

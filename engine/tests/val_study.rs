@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use vasos_engine::identify::{
-    Drift, FitProblem, FitVerdict, LoopRecord, LoopStudy, RecordFinding, StudyOptions, study_loop,
+    Drift, FitProblem, FitVerdict, LoopRecord, LoopStudy, ModeColumn, RecordFinding, StudyOptions, study_loop,
 };
 
 /// A FOPDT process K = 2, T = 40 s, L = 6 s under PI, sampled at 1 s.
@@ -90,7 +90,7 @@ impl Loop {
 fn study(r: &Record, options: &StudyOptions) -> LoopStudy {
     let mut problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);
     problem.options.drift = Drift::Auto;
-    let record = LoopRecord { problem, sp: Some(&r.sp), mode: Some(&r.mode) };
+    let record = LoopRecord { problem, sp: Some(&r.sp), mode: Some(ModeColumn::of_numbers(&r.mode)) };
     study_loop(&record, options).expect("a study")
 }
 
@@ -202,7 +202,7 @@ fn val_modes_slips_spikes_and_gaps_in_one_log() {
     let has = |test: fn(&RecordFinding) -> bool| found.findings.iter().any(test);
     assert!(has(|f| matches!(f, RecordFinding::Outliers { count: 3, .. })), "{:?}", found.findings);
     assert!(has(|f| matches!(f, RecordFinding::MvSlips { count: 1, row: 1501, .. })), "{:?}", found.findings);
-    assert!(has(|f| matches!(f, RecordFinding::ModeChanges { count: 2, mode, .. } if *mode == 1.0)));
+    assert!(has(|f| matches!(f, RecordFinding::ModeChanges { count: 2, mode, .. } if mode == "1")));
     holds(&found, "K", 2.0, 0.03);
     let c = found.controller.as_ref().expect("a controller");
     assert!((c.kc - 1.2).abs() < 0.05 && (c.ti_s.expect("Ti") - 40.0).abs() < 3.0, "{c:?}");

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use vasos_engine::identify::{
-    Disturbance, Drift, FitProblem, LoopRecord, LoopStudy, StudyOptions, study_loop,
+    Disturbance, Drift, FitProblem, LoopRecord, LoopStudy, ModeColumn, StudyOptions, study_loop,
 };
 use vasos_engine::signal::derived_column;
 use vasos_io::log::{ImportOptions, import_log};
@@ -96,7 +96,10 @@ fn study(folder: &Path, case: &Case) -> Result<(String, LoopStudy), String> {
         let name = case.disturbance.to_owned();
         problem.disturbances = vec![Disturbance { name, values: &rows.columns[2] }];
     }
-    let record = LoopRecord { problem, sp: sp.as_deref(), mode: mode.as_deref() };
+    let words = roles.mode.as_deref().and_then(|name| log.table.columns.iter().find(|c| c.name == name));
+    let words = words.map_or(&[][..], |column| &column.states);
+    let mode = mode.as_deref().map(|values| ModeColumn { values, words });
+    let record = LoopRecord { problem, sp: sp.as_deref(), mode };
     let study = study_loop(&record, &StudyOptions::default()).map_err(|e| e.to_string())?;
     Ok((format!("{pv_name} from {mv_name}"), study))
 }

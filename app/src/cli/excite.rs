@@ -71,19 +71,19 @@ struct SignalArguments {
     #[arg(long, value_name = "CM", allow_hyphen_values = true)]
     setpoint_step: Option<f64>,
     /// Relay of that amplitude.
-    #[arg(long, value_name = "D")]
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
     relay: Option<f64>,
     /// Doublet of that amplitude, with --hold.
     #[arg(long, value_name = "A", allow_hyphen_values = true, requires = "hold")]
     doublet: Option<f64>,
     /// Binary sequence of maximum length of that amplitude, with --clock.
-    #[arg(long, value_name = "A", requires = "clock")]
+    #[arg(long, value_name = "A", requires = "clock", allow_hyphen_values = true)]
     prbs: Option<f64>,
     /// Sines of that amplitude, with --frequencies.
-    #[arg(long, value_name = "A", requires = "frequencies")]
+    #[arg(long, value_name = "A", requires = "frequencies", allow_hyphen_values = true)]
     sine: Option<f64>,
     /// Proportional control from that gain on, with --kick.
-    #[arg(long, value_name = "K", requires = "kick")]
+    #[arg(long, value_name = "K", requires = "kick", allow_hyphen_values = true)]
     ultimate_gain: Option<f64>,
 }
 
@@ -91,28 +91,34 @@ struct SignalArguments {
 #[derive(Debug, clap::Args)]
 struct SettingArguments {
     /// Relay: amplitude downwards; another one than upwards gives the static gain.
-    #[arg(long, value_name = "D", requires = "relay")]
+    #[arg(long, value_name = "D", requires = "relay", allow_hyphen_values = true)]
     down: Option<f64>,
     /// Relay: hysteresis in cm.
-    #[arg(long, value_name = "CM", requires = "relay", conflicts_with = "noise_factor")]
+    #[arg(
+        long,
+        value_name = "CM",
+        requires = "relay",
+        conflicts_with = "noise_factor",
+        allow_hyphen_values = true
+    )]
     hysteresis: Option<f64>,
     /// Relay: hysteresis as a multiple of the noise's sd(δ); 3 where neither is given.
-    #[arg(long, value_name = "F", requires = "relay")]
+    #[arg(long, value_name = "F", requires = "relay", allow_hyphen_values = true)]
     noise_factor: Option<f64>,
     /// Relay, sines and ultimate gain: cycles that are averaged.
     #[arg(long, value_name = "N")]
     cycles: Option<u32>,
     /// Doublet: length of each half in seconds.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     hold: Option<f64>,
     /// Binary sequence: length of a bit in seconds.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     clock: Option<f64>,
     /// Binary sequence: length of the register, 2 to 11.
     #[arg(long, value_name = "N", default_value_t = 6)]
     register: u32,
     /// Sines: frequencies in rad/s, with commas between them.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     frequencies: Option<Vec<f64>>,
     /// Ultimate gain: change of the output that sets the loop going.
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
@@ -254,7 +260,7 @@ fn as_json(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Valu
         Ending::Finished => Value::Null,
         Ending::Stopped(reason) => json!(reason.to_string()),
     };
-    let model = told.and_then(|t| t.as_ref().ok()).map(|told| {
+    let model = told.and_then(|t| t.as_ref().ok()).filter(|told| told.has_model).map(|told| {
         let mut model = super::identify::model_json(told.fit());
         for (key, value) in [("Ku", told.ultimate.map(|u| u.ku)), ("Pu_s", told.ultimate.map(|u| u.pu_s))] {
             model[key] = json!(value);
@@ -321,7 +327,8 @@ fn as_text(arguments: &Arguments, report: &ExcitationReport, told: Told) -> Stri
         text.push_str(&table(&rows));
     }
     match told {
-        Some(Ok(told)) => text.push_str(&model_text(told)),
+        Some(Ok(told)) if told.has_model => text.push_str(&model_text(told)),
+        Some(Ok(told)) => told.warnings.iter().for_each(|w| text.push_str(&format!("note: {w}\n"))),
         Some(Err(error)) => text.push_str(&format!("no model: {error}\n")),
         None => {}
     }

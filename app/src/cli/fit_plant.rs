@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 use vasos_engine::identify::grey_box::{
-    FreeParameter, GreyBoxFit, GreyBoxProblem, GreyBoxRecord, RecordFit, RecordedInput, RecordedOutput,
-    fit_rig, input_named, output_named,
+    FreeParameter, GreyBoxFit, GreyBoxProblem, GreyBoxRecord, GreyBoxVerdict, RecordFit, RecordedInput,
+    RecordedOutput, fit_rig, input_named, output_named,
 };
 use vasos_engine::plant::Network;
 use vasos_engine::signal::derived_column;
@@ -28,6 +28,7 @@ Parameters are named TAG.field. They are marked in the table [fit] of the rig fi
 A pump is named by its tag or signal (or 'pump' where there is one), a level by its tank's tag or signal or its sensor's
 tag. COL is a column or an expression of columns. The rig is simulated in free run from initial levels that are estimated
 along; those of --validate are estimated on its first rows alone.
+Exit status 1: the rig does not follow the recording with any values within the bounds.
 JSON: {parameters, interval_95, rmse_train, rmse_validate, initial_samples, standard_error, initial_levels, outputs:
 [{output, rmse_train, fit_percent_train, rmse_validate, fit_percent_validate}], verdicts, rig, configuration, remarks}.")]
 pub struct Arguments {
@@ -84,7 +85,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     };
     let text =
         if arguments.json { whole(&problem, &fit, &remarks).to_string() } else { words(&problem, &fit) };
-    Ok(Answer { text, remarks, status: 0 })
+    let hopeless = fit.verdicts.iter().any(GreyBoxVerdict::is_refusal);
+    Ok(Answer { text, remarks, status: u8::from(hopeless) })
 }
 
 fn configuration(network: &Network, id: Option<&str>) -> Result<usize, Refusal> {

@@ -21,6 +21,8 @@ const SURE: f64 = 3.0;
 /// The mean output of a cycle, as a share of the relay's amplitude, must be that many times the noise, as a share of the
 /// cycle's amplitude, to tell the static gain.
 const TELLING: f64 = 2.0;
+/// A static gain with a standard error beyond this share of it is none.
+const UNKNOWN: f64 = 0.3;
 
 /// One cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -170,8 +172,9 @@ impl RelayMachine {
         (count > 0).then(|| self.last().map(|c| of(&c)).sum::<f64>() / count as f64)
     }
 
-    /// ∫y dt/∫u dt over the last cycles, and its standard error as they differ among each other. Where the process
-    /// integrates over a cycle, the mean output is close to that at rest, and noise alone decides the ratio.
+    /// ∫y dt/∫u dt over the last cycles, and its standard error: as they differ among each other, and by what the mean PV
+    /// may still have to go. Where the process integrates over a cycle, the mean output is close to that at rest, and
+    /// noise alone decides the ratio.
     fn static_gain(&self) -> Option<(f64, f64)> {
         let count = self.last().count() as f64;
         let gain = self.mean(|c| c.pv_integral)? / self.mean(|c| c.mv_integral)?;
@@ -180,7 +183,35 @@ impl RelayMachine {
         let mean_mv = self.mean(|c| c.mv_integral)? / self.mean(|c| c.period_s)?;
         let share = mean_mv.abs() / (0.5 * (self.relay.amplitude + self.relay.down()));
         let tells = share > TELLING * self.noise_sd / self.mean(|c| c.amplitude)?;
-        (tells && gain.is_finite() && error.is_finite()).then_some((gain, error))
+        let error = error.hypot(gain.abs() * self.left_to_go()?);
+        (tells && gain.is_finite() && error < UNKNOWN * gain.abs()).then_some((gain, error))
+    }
+
+    /// Share of the mean PV by which it may still change; `None` where it says nothing of where it goes.
+    ///
+    /// A mean that settles as 1 − e^(−x), x cycles over the time constant counted in cycles, grows by
+    /// q = x/(eˣ − 1) of itself times cycle over cycles so far; 1/(eˣ − 1) = q/x is left. q is taken two standard errors
+    /// above what was seen.
+    fn left_to_go(&self) -> Option<f64> {
+        /// Above this most of the way is still to go.
+        const GROWS: f64 = 0.5;
+        let count = self.last().count() as f64;
+        let mean_of = |c: Cycle| c.pv_integral / c.period_s;
+        let (first, last) = (mean_of(self.last().next()?), mean_of(self.last().last()?));
+        let mean = self.last().map(mean_of).sum::<f64>() / count;
+        let samples = self.mean(|c| c.period_s)? / self.sample_time_s;
+        let noise = self.noise_sd * (2.0 / samples).sqrt() / (count - 1.0);
+        let growth = (last - first).abs() / (count - 1.0) + 2.0 * noise;
+        let q = growth * (self.closed as f64 - 0.5 * count) / mean.abs();
+        if q.is_nan() || q >= GROWS {
+            return None;
+        }
+        let (mut low, mut high) = (1.0_f64, 60.0_f64);
+        for _ in 0..50 {
+            let x = 0.5 * (low + high);
+            if x / x.exp_m1() > q { low = x } else { high = x }
+        }
+        Some(q / low)
     }
 
     pub fn state(&self) -> State {

@@ -6,11 +6,13 @@ use super::progress::Envelope;
 use super::spec::{Excitation, Signal};
 use super::stop::StopReason;
 use crate::explain::{Explain, number};
-use crate::identify::{Choice, FitError, FitProblem, ModelFit, Structure, choose_from_rest};
+use crate::identify::{Choice, FitError, FitProblem, FitVerdict, ModelFit, Structure, choose_from_rest};
 use crate::tune::{Ultimate, ultimate};
 
 /// ε/a above which 4d/(πa) and its like are far from the ultimate point: at 0.3 the ultimate gain is 40 % low.
 const WIDE_HYSTERESIS: f64 = 0.3;
+/// Fit in percent below which the record of a test that ended early tells no model.
+const TOLD_PERCENT: f64 = 70.0;
 
 /// Columns of a test, one entry a sample. A row's setpoint and MV apply from its time until the next; its PV was
 /// measured just before.
@@ -171,7 +173,14 @@ impl ExcitationReport {
         if let Finding::Relay(relay) = &self.finding
             && relay.hysteresis_ratio() > WIDE_HYSTERESIS
         {
-            warnings.push(ExcitationWarning::WideHysteresis { ratio: relay.hysteresis_ratio() });
+            let amplitude = self.amplitude_for(relay);
+            warnings.push(ExcitationWarning::WideHysteresis { ratio: relay.hysteresis_ratio(), amplitude });
+        }
+        if let (Signal::Relay(asked), Finding::Relay(relay)) = (&self.excitation.signal, &self.finding)
+            && asked.down() != asked.amplitude
+            && relay.static_gain.is_none()
+        {
+            warnings.push(ExcitationWarning::NoStaticGain { cycles: relay.cycles });
         }
         if let (Signal::SteppedSine(sine), Finding::Frequencies(points)) =
             (&self.excitation.signal, &self.finding)
@@ -184,17 +193,65 @@ impl ExcitationReport {
     }
 }
 
+impl ExcitationReport {
+    /// Amplitude in MV units at which the hysteresis would be narrow: beyond ε the PV goes in proportion to it.
+    fn amplitude_for(&self, relay: &RelayFinding) -> f64 {
+        let Signal::Relay(asked) = &self.excitation.signal else { return f64::NAN };
+        let wanted = relay.hysteresis * (1.0 / WIDE_HYSTERESIS - 1.0);
+        asked.amplitude * wanted / (relay.amplitude - relay.hysteresis).max(f64::MIN_POSITIVE)
+    }
+
+    /// Sign of the PV's first answer over that of the move it answers, as a relay sees it: where the PV was when the
+    /// output moved for the second time. `None` where noise hides it.
+    fn first_answer(&self) -> Option<f64> {
+        /// Standard deviations of the noise that chance does not reach in a few rows.
+        const SURE: f64 = 3.0;
+        let (rest_pv, rest_mv) = self.pv_at_rest.zip(self.mv_at_rest)?;
+        let first = self.record.time_s.iter().position(|t| Some(*t) >= self.moved_at_s)?;
+        let moved = self.record.mv[first] - rest_mv;
+        let answer = match self.excitation.signal {
+            Signal::Relay(_) => {
+                let second = (first + 1..self.record.mv.len())
+                    .find(|&k| self.record.mv[k] != self.record.mv[k - 1])?;
+                self.record.pv[second] - rest_pv
+            }
+            _ => return None,
+        };
+        let beyond = answer.abs() > SURE * self.noise_sd.unwrap_or(0.0);
+        (beyond && moved != 0.0).then(|| (answer * moved).signum())
+    }
+}
+
 /// A remark on what was measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExcitationWarning {
     /// The relay's hysteresis is wide against its cycle.
     #[error(
-        "ε/a = {}: above 0.3 the cycle is far from the ultimate point; take a larger amplitude or less hysteresis, and the model rather than 4d/(πa)",
-        number(*.ratio)
+        "ε/a = {}: above 0.3 the cycle is far from the ultimate point; take an amplitude of about {} or less hysteresis, and the model rather than 4d/(πa)",
+        number(*.ratio), number(*.amplitude)
     )]
     WideHysteresis {
         /// ε/a.
         ratio: f64,
+        /// Amplitude at which it would be 0.3, in MV units.
+        amplitude: f64,
+    },
+    /// The mean PV of an asymmetric relay does not tell the static gain.
+    #[error(
+        "no static gain: over {cycles} cycles the mean PV had not settled, or noise hides it; the process is much slower than the cycle, and a step tells its gain"
+    )]
+    NoStaticGain {
+        /// Cycles averaged.
+        cycles: u32,
+    },
+    /// A test that ended early recorded too little for a model.
+    #[error(
+        "no model: the test ended before it was finished, and a first order explains {} % of what was recorded",
+        number(*.fit_percent)
+    )]
+    NoModel {
+        /// Fit in percent.
+        fit_percent: f64,
     },
     /// The fitted model turns the other way than the first pulse did.
     #[error(
@@ -219,6 +276,8 @@ impl Explain for ExcitationWarning {
     fn key(&self) -> &'static str {
         match self {
             Self::WideHysteresis { .. } => "excitation_warning.wide_hysteresis",
+            Self::NoStaticGain { .. } => "excitation_warning.no_static_gain",
+            Self::NoModel { .. } => "excitation_warning.no_model",
             Self::OtherSign { .. } => "excitation_warning.other_sign",
             Self::MissingFrequencies { .. } => "excitation_warning.missing_frequencies",
         }
@@ -226,7 +285,11 @@ impl Explain for ExcitationWarning {
 
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
-            Self::WideHysteresis { ratio } => vec![("ratio", number(*ratio))],
+            Self::WideHysteresis { ratio, amplitude } => {
+                vec![("ratio", number(*ratio)), ("amplitude", number(*amplitude))]
+            }
+            Self::NoStaticGain { cycles } => vec![("cycles", cycles.to_string())],
+            Self::NoModel { fit_percent } => vec![("fit_percent", number(*fit_percent))],
             Self::OtherSign { gain } => vec![("gain", number(*gain))],
             Self::MissingFrequencies { found, wanted } => {
                 vec![("found", found.to_string()), ("wanted", wanted.to_string())]
@@ -240,7 +303,9 @@ impl ExcitationWarning {
     #[must_use]
     pub fn samples() -> Vec<Self> {
         vec![
-            Self::WideHysteresis { ratio: 0.42 },
+            Self::WideHysteresis { ratio: 0.42, amplitude: 0.51 },
+            Self::NoStaticGain { cycles: 3 },
+            Self::NoModel { fit_percent: 24.0 },
             Self::OtherSign { gain: -0.25 },
             Self::MissingFrequencies { found: 3, wanted: 5 },
         ]
@@ -252,7 +317,10 @@ impl ExcitationWarning {
 pub struct Identified {
     /// First order or integrator with dead time, whichever the record speaks for, best first.
     pub choice: Choice,
-    /// Ku and Pu of that model; absent where no proportional gain brings it to its limit.
+    /// Whether that model may be used: not where the test ended early and the record says too little.
+    pub has_model: bool,
+    /// Ku and Pu of that model; absent where no proportional gain brings it to its limit, where its gain has the wrong
+    /// sign, and without a model.
     pub ultimate: Option<Ultimate>,
     /// What has to be said about it besides the verdicts of the fit.
     pub warnings: Vec<ExcitationWarning>,
@@ -273,14 +341,30 @@ impl Identified {
 pub fn identify_report(report: &ExcitationReport) -> Result<Identified, FitError> {
     let Record { time_s, pv, mv, .. } = &report.record;
     let problem = FitProblem::new(time_s, pv, mv);
-    let choice = choose_from_rest(&problem, &[Structure::Fopdt, Structure::Ipdt]).0?;
+    let mut choice = choose_from_rest(&problem, &[Structure::Fopdt, Structure::Ipdt]).0?;
+    if let Some(noise_sd) = report.noise_sd {
+        choice.weigh_noise(noise_sd);
+    }
     let fit = choice.chosen();
     let found = match &report.finding {
         Finding::Relay(relay) => Some(relay.ku),
         Finding::Ultimate(found) => Some(found.ku),
-        _ => None,
+        _ => report.first_answer(),
     };
     let gain = fit.parameters[0].value;
-    let turned = found.filter(|ku| ku * gain < 0.0).map(|_| ExcitationWarning::OtherSign { gain });
-    Ok(Identified { ultimate: ultimate(&fit.model), warnings: turned.into_iter().collect(), choice })
+    let turned = found.is_some_and(|ku| ku * gain < 0.0);
+    let finished = report.ending == Ending::Finished;
+    let known = |v: &FitVerdict| !v.is_objection() || matches!(v, FitVerdict::Noisy { .. });
+    let explains = fit.fit_percent > TOLD_PERCENT || fit.verdicts.iter().all(known);
+    let useless = !finished && (turned || !fit.is_usable() || !explains);
+    let mut warnings = Vec::new();
+    if turned {
+        warnings.push(ExcitationWarning::OtherSign { gain });
+    }
+    if useless {
+        warnings.push(ExcitationWarning::NoModel { fit_percent: fit.fit_percent });
+    }
+    let told = !(useless || turned);
+    let ultimate = told.then(|| ultimate(&fit.model)).flatten();
+    Ok(Identified { ultimate, has_model: !useless, warnings, choice })
 }

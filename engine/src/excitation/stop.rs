@@ -36,7 +36,7 @@ pub enum StopReason {
     },
     /// A gain so high that noise alone fills the output's range, or far from where it began, and nothing swings.
     #[error(
-        "ended at the gain {}: no oscillation stands out of the noise; give a larger kick, or use a relay", number(*.gain)
+        "ended at the gain {}: no oscillation stands out of the noise, nor could one at a higher gain within the output's limits; use a relay", number(*.gain)
     )]
     NoOscillation {
         /// The last gain in MV units per PV unit.

@@ -57,6 +57,9 @@ pub(super) struct UltimateMachine {
     room: [f64; 2],
     pulse: f64,
     blind: f64,
+    /// Highest gain at which an oscillation between the limits of the output stands out of the noise: the first harmonic
+    /// of a square wave of height d, 4d/π, over the gain.
+    highest: f64,
     doing: Doing,
     recent: [f64; SMOOTHED],
     heard: usize,
@@ -90,6 +93,7 @@ impl UltimateMachine {
             room: ground.room,
             pulse: noise.max(ground.least),
             blind: noise,
+            highest: 4.0 * ground.room[1].min(-ground.room[0]) / (std::f64::consts::PI * FLOOR * noise),
             doing: Doing::FirstKick,
             recent: [0.0; SMOOTHED],
             heard: 0,
@@ -136,6 +140,12 @@ impl UltimateMachine {
             return Order::Done;
         }
         let [low, high] = self.room;
+        if self.gain > self.highest {
+            if self.dying.is_some_and(|(gain, _)| gain >= CLOSE.recip() * self.highest) {
+                return Order::NoOscillation(self.sign * self.highest);
+            }
+            self.gain = self.highest;
+        }
         if self.gain * self.blind > high - low || self.gain > HOPELESS * self.test.start_gain {
             return Order::NoOscillation(self.sign * self.gain);
         }

@@ -29,6 +29,19 @@ impl Choice {
         }
     }
 
+    /// Takes back that a fit is poor where noise of this standard deviation, in PV units, is all that it leaves.
+    pub(crate) fn weigh_noise(&mut self, noise_sd: f64) {
+        /// What a drift or a converter may add to the noise heard at rest.
+        const ROOM: f64 = 1.3;
+        for fit in self.fits.iter_mut().filter(|fit| fit.mse.sqrt() < ROOM * noise_sd) {
+            for verdict in &mut fit.verdicts {
+                if let FitVerdict::Poor { fit_percent } = *verdict {
+                    *verdict = FitVerdict::Noisy { fit_percent };
+                }
+            }
+        }
+    }
+
     /// The fit chosen.
     #[must_use]
     pub fn chosen(&self) -> &ModelFit {
@@ -89,6 +102,13 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     let mut order: Vec<(bool, f64, ModelFit)> =
         fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let enough = (0..order.len())
+        .filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG)
+        // What still follows the MV is in the process, however little it weighs.
+        .filter(|&i| order[0].2.tests.follows_input() || !order[i].2.tests.follows_input());
+    if let Some(simplest) = enough.min_by_key(|&i| order[i].2.unknowns) {
+        order[..=simplest].rotate_right(1);
+    }
     let smallest = order.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
     let criterion = order.iter().map(|o| o.1 - smallest).collect();
     let mut fits: Vec<ModelFit> = order.into_iter().map(|o| o.2).collect();
@@ -99,6 +119,21 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     Ok(Choice { fits, criterion })
 }
 
+/// Difference of Schwarz's criterion that is "very strong" evidence (Kass & Raftery, JASA 90 (1995) 773).
+const VERY_STRONG: f64 = 10.0;
+
+/// Whether a zero may cancel a time constant: their ratio is not told from 1, or next to it.
+fn cancels(fit: &ModelFit) -> bool {
+    /// A pole and a zero this close leave nothing to see between them.
+    const ALIKE: f64 = 0.1;
+    let (Some(zero), true) = (fit.parameter("Tz_s"), fit.parameter("T2_s").is_some()) else { return false };
+    ["T_s", "T2_s"].iter().filter_map(|name| fit.parameter(name)).any(|pole| {
+        let apart =
+            zero.interval_95[0].max(pole.interval_95[0]) > zero.interval_95[1].min(pole.interval_95[1]);
+        (zero.value / pole.value - 1.0).abs() < ALIKE || !apart
+    })
+}
+
 /// Whether a parameter that sets the structure apart from a simpler one cannot be told from nothing.
 fn is_flawed(fit: &ModelFit, span_s: f64) -> bool {
     let unknown = fit.parameters.iter().any(|p| !p.standard_error.is_finite());
@@ -106,5 +141,5 @@ fn is_flawed(fit: &ModelFit, span_s: f64) -> bool {
         |name: &str| fit.parameter(name).is_some_and(|p| p.interval_95[0] <= 0.0 && p.interval_95[1] >= 0.0);
     let scattered = fit.parameter("T2_s").is_some_and(|p| p.standard_error > p.value);
     let long = fit.parameter("T_s").is_some_and(|t| t.value > 2.0 * span_s);
-    unknown || scattered || nothing("T2_s") || nothing("Tz_s") || long
+    unknown || scattered || nothing("T2_s") || nothing("Tz_s") || cancels(fit) || long
 }

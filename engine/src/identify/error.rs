@@ -62,6 +62,17 @@ pub enum FitError {
         /// Name of the time column.
         column: String,
     },
+    /// Values so large or small that their squares are no numbers any more.
+    #[error(
+        "the values of {column} are as large as {}: choose a unit in which they lie between 1e-100 and 1e100",
+        number(*.size)
+    )]
+    OutOfScale {
+        /// Name of the column.
+        column: String,
+        /// Size of its largest value.
+        size: f64,
+    },
     /// The MV holds still.
     #[error("{column} does not move in this stretch (it stays at {}): choose one where it does", number(*.value))]
     ConstantMv {
@@ -130,6 +141,7 @@ impl Explain for FitError {
             Self::NotFinite { .. } => "fit.not_finite",
             Self::TimeBackwards { .. } => "fit.time_backwards",
             Self::NoTimeSpan { .. } => "fit.no_time_span",
+            Self::OutOfScale { .. } => "fit.out_of_scale",
             Self::ConstantMv { .. } => "fit.constant_mv",
             Self::ConstantPv { .. } => "fit.constant_pv",
             Self::NeedsMvBefore { .. } => "fit.needs_mv_before",
@@ -160,6 +172,9 @@ impl Explain for FitError {
                 ("from_s", number(*from_s)),
                 ("to_s", number(*to_s)),
             ],
+            Self::OutOfScale { column, size } => {
+                vec![("column", column.clone()), ("size", number(*size))]
+            }
             Self::NoTimeSpan { column } => vec![("column", column.clone())],
             Self::ConstantMv { column, value }
             | Self::ConstantPv { column, value }
@@ -193,6 +208,7 @@ impl FitError {
             Self::NotFinite { column: pv_name.clone(), row: 12, value: f64::NAN },
             Self::TimeBackwards { column: "time".to_owned(), row: 5, from_s: 4.0, to_s: 1.5 },
             Self::NoTimeSpan { column: "time".to_owned() },
+            Self::OutOfScale { column: pv_name.clone(), size: 3e200 },
             Self::ConstantMv { column: mv_name.clone(), value: 2.5 },
             Self::ConstantPv { column: pv_name.clone(), value: 10.0 },
             Self::NeedsMvBefore { pv_name: pv_name.clone(), mv_name: mv_name.clone(), value: 50.0 },

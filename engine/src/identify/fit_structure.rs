@@ -7,7 +7,7 @@ use super::output_error::{
     Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, dead_time_interval, evaluate,
     is_wide, search,
 };
-use super::parameters::Coordinates;
+use super::parameters::{Coordinates, Parameter};
 use super::problem::{Drift, FitProblem, Stretch};
 use super::residual_tests::ResidualTests;
 use super::statistics::student_95;
@@ -123,7 +123,7 @@ fn profile_dead_times(
     }
 }
 
-fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
+pub(super) fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
     let (main, other) = match structure {
         Structure::Fopdt => (Order::First, Order::First),
         Structure::Ipdt => (Order::Integrator, Order::Integrator),
@@ -184,10 +184,12 @@ fn report(
     let centred: f64 =
         (0..shape.channels.len()).map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference).sum();
     let mse = rss / rows as f64;
+    let mut parameters = main.parameters(student);
+    parameters.iter_mut().for_each(|p| forget(p, stretch));
     Some(ModelFit {
         structure,
         model,
-        parameters: main.parameters(student),
+        parameters,
         disturbances,
         bias: (!shape.integrating()).then(|| stretch.y_ref + linear.shared[0] - centred),
         mv_at_rest: slope.filter(|_| shape.integrating()).map(|(s, _)| stretch.u_ref - s / gain),
@@ -211,6 +213,30 @@ fn report(
     })
 }
 
+/// A time whose interval reaches far beyond the stretch, or a gain whose interval dwarfs all that was seen, is unknown.
+fn forget(p: &mut Parameter, stretch: &Stretch) {
+    /// Lengths of the stretch.
+    const SPANS: f64 = 1e3;
+    /// Ratios of the PV's range to the MV's.
+    const GAINS: f64 = 1e6;
+    let range = |values: &[f64]| {
+        let ends = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        ends[1] - ends[0]
+    };
+    let width = p.interval_95[1] - p.interval_95[0];
+    let (most, low) = match p.name {
+        "K" => (GAINS * range(&stretch.y) / range(&stretch.u), f64::NEG_INFINITY),
+        "Kv" => (GAINS * range(&stretch.y) / (range(&stretch.u) * stretch.span_s()), f64::NEG_INFINITY),
+        "zeta" => (SPANS, 0.0),
+        "Tz_s" => (SPANS * stretch.span_s(), f64::NEG_INFINITY),
+        _ => (SPANS * stretch.span_s(), 0.0),
+    };
+    if width.is_nan() || width > most {
+        p.standard_error = f64::INFINITY;
+        p.interval_95 = [low, f64::INFINITY];
+    }
+}
+
 /// Places of a channel's gains and unknowns in the matrix of the projected problem.
 fn places(shape: &Shape, channel: usize) -> Vec<usize> {
     let order = shape.channels[channel];
@@ -231,7 +257,7 @@ fn taken(whole: Option<&Symmetric>, places: &[usize], variance: f64) -> Symmetri
 }
 
 /// Free run ŷ on every row, and the residuals of those that count.
-fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
     let mut simulated = Vec::with_capacity(stretch.len());
     let mut residuals = Vec::with_capacity(stretch.len());
     let whole = Stretch { keep: None, ..stretch.clone() };

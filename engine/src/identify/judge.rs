@@ -18,7 +18,13 @@ const CORRELATED: f64 = 0.3;
 pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) -> Vec<FitVerdict> {
     let mut found = Vec::new();
     if fit.fit_percent < POOR_PERCENT {
-        found.push(FitVerdict::Poor { fit_percent: fit.fit_percent });
+        let fit_percent = fit.fit_percent;
+        // White residuals leave another structure nothing to explain.
+        found.push(if fit.tests.is_white() && half_percent(&fit.parameters[0]) < GAIN_KNOWN_PERCENT {
+            FitVerdict::Noisy { fit_percent }
+        } else {
+            FitVerdict::Poor { fit_percent }
+        });
     }
     parameters(fit, stretch, &mut found);
     for d in &fit.disturbances {
@@ -29,6 +35,7 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
     }
     found.extend(too_coarse(fit, problem));
     residuals(fit, &mut found);
+    found.extend(rings(fit));
     if found.is_empty() {
         let gain = &fit.parameters[0];
         found.push(FitVerdict::Good {
@@ -82,7 +89,9 @@ fn parameters(fit: &ModelFit, stretch: &Stretch, found: &mut Vec<FitVerdict>) {
             && p.value.abs() > sample_time_s / 3.0
         {
             let percent = half_percent(p);
-            if percent > KNOWN_PERCENT {
+            if !percent.is_finite() {
+                found.push(FitVerdict::ParameterUnknown { name: symbol });
+            } else if percent > KNOWN_PERCENT {
                 let mv_move = moved * percent / 20.0;
                 found.push(FitVerdict::ParameterUncertain { name: symbol, percent, mv_move });
             }
@@ -90,7 +99,9 @@ fn parameters(fit: &ModelFit, stretch: &Stretch, found: &mut Vec<FitVerdict>) {
     }
     if let Some(l) = fit.parameter("L_s") {
         let [lower, upper] = l.interval_95;
-        if lower <= 0.0 && (upper.is_nan() || upper > sample_time_s) {
+        if !upper.is_finite() {
+            found.push(FitVerdict::ParameterUnknown { name: "L" });
+        } else if lower <= 0.0 && upper > sample_time_s {
             let times = ((upper - l.value) / l.value.max(sample_time_s)).max(1.0);
             found.push(FitVerdict::DeadTimeUnknown { upper_s: upper, mv_move: moved * times });
         }
@@ -113,6 +124,18 @@ fn movement(stretch: &Stretch) -> f64 {
 
 fn range<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
+}
+
+/// A swing that the MV need not have made: with a process that rings alone, noise would be all that is left.
+fn rings(fit: &ModelFit) -> Option<FitVerdict> {
+    const ZETA: f64 = 0.3;
+    const EXPLAINED_PERCENT: f64 = 95.0;
+    let (zeta, tau) = (fit.parameter("zeta")?.value, fit.parameter("T_s")?.value);
+    let more_than_noise = fit.fit_percent < EXPLAINED_PERCENT && !fit.tests.is_white();
+    (zeta < ZETA && more_than_noise).then(|| FitVerdict::Rings {
+        period_s: 2.0 * std::f64::consts::PI * tau / (1.0 - zeta * zeta).sqrt(),
+        zeta,
+    })
 }
 
 /// Residuals smaller than a step of a PV that moves by few of them.

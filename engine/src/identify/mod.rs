@@ -15,6 +15,7 @@
 //! before the stamp. Policy for non-finite numbers: a row that holds one is refused with its number.
 
 mod choose;
+mod damped;
 mod error;
 mod fit_structure;
 mod fopdt;
@@ -50,5 +51,7 @@ pub use residual_tests::ResidualTests;
 pub use rest::choose_from_rest;
 pub use simulate::simulate_fopdt;
 pub use structure::Structure;
-pub use study::{ControllerFit, LoopRecord, LoopStudy, Oscillation, RecordFinding, StudyOptions, study_loop};
+pub use study::{
+    ControllerFit, LoopRecord, LoopStudy, ModeColumn, Oscillation, RecordFinding, StudyOptions, study_loop,
+};
 pub use verdict::FitVerdict;

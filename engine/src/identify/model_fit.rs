@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fopdt::Interval;
+use super::output_error::Symmetric;
 use super::parameters::{Coordinates, Parameter};
 use super::residual_tests::ResidualTests;
 use super::{FitVerdict, Structure};
@@ -97,6 +98,26 @@ impl ModelFit {
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// Adds to the covariance what else is unknown; an interval by likelihood ratio grows on both sides.
+    pub(super) fn widen(&mut self, added: &Symmetric) {
+        let before = self.coordinates.covariance.clone();
+        for i in 0..added.size {
+            for j in 0..added.size {
+                self.coordinates.covariance.add(i, j, added.at(i, j));
+            }
+        }
+        let dead_time = self.parameters.iter().find(|p| p.name == "L_s").cloned();
+        self.parameters = self.coordinates.parameters(self.student);
+        let last = before.size - 1;
+        if let (Some(old), Some(new)) = (dead_time, self.parameters.last_mut()) {
+            let share = added.at(last, last) / self.coordinates.covariance.at(last, last);
+            let more = self.student * new.standard_error * share.max(0.0).sqrt();
+            let out = |end: f64| (end - old.value).hypot(more);
+            new.interval_95 =
+                [(old.value - out(old.interval_95[0])).max(0.0), old.value + out(old.interval_95[1])];
+        }
     }
 
     /// Whether a finding says that the stretch cannot tell a model at all.

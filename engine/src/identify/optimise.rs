@@ -1,5 +1,6 @@
 //! Gauss–Newton over (ln T, L/T) with Levenberg–Marquardt damping, the linear unknowns projected out.
 
+use super::damped::descend;
 use super::gram::{Linear, Projected, project};
 use super::problem::Stretch;
 use super::response::{Dynamics, pass};
@@ -12,7 +13,6 @@ const MANY_ROWS: usize = 100_000;
 const STEP_AT_ROUNDING: f64 = 1e-12;
 /// Largest change of ln T in a step.
 const LARGEST_STEP: f64 = 1.5;
-const LARGEST_DAMPING: f64 = 1e7;
 
 /// Where T and L may lie, in seconds.
 #[derive(Debug, Clone, Copy)]
@@ -74,33 +74,17 @@ pub(super) fn refine(
     evaluations: &mut usize,
 ) -> Option<Point> {
     *evaluations += 1;
-    let mut best = evaluate(stretch, bounds.clip(start), &no_reference(stretch))?;
+    let start = evaluate(stretch, bounds.clip(start), &no_reference(stretch))?;
     let spare = stretch.len().saturating_sub(stretch.unknowns()).max(1) as f64;
     let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
-    let mut damping = 1e-6;
-    for _ in 1..passes {
-        let reduced = reduce(&best.projected);
-        let step = reduced.step(damping, best.dynamics.dead_time_s <= 0.0);
-        let target = moved(best.dynamics, step, bounds);
-        let taken = difference(best.dynamics, target);
-        let variance = best.rss() / spare;
-        if reduced.is_small(taken, variance, tolerance) {
-            break;
-        }
-        *evaluations += 1;
-        let trial = evaluate(stretch, target, &best.projected.linear);
-        match trial {
-            Some(trial) if trial.rss() <= best.rss() => {
-                damping = (damping * 0.1).max(1e-12);
-                best = trial;
-            }
-            _ => damping = (damping * 30.0).max(1e-3),
-        }
-        if damping > LARGEST_DAMPING {
-            break;
-        }
-    }
-    Some(best)
+    let step = |at: &Point, damping: f64| {
+        let reduced = reduce(&at.projected);
+        let target = moved(at.dynamics, reduced.step(damping, at.dynamics.dead_time_s <= 0.0), bounds);
+        let taken = difference(at.dynamics, target);
+        (!reduced.is_small(taken, at.rss() / spare, tolerance)).then_some(target)
+    };
+    let pass = |target: Dynamics, best: &Point| evaluate(stretch, target, &best.projected.linear);
+    Some(descend(start, passes, evaluations, Point::rss, step, pass))
 }
 
 /// The best T for a given L, from a point nearby.

@@ -43,6 +43,21 @@ impl Coordinates {
         Self { structure, base_s: point.time_s, values, covariance }
     }
 
+    /// How many of the values are gains.
+    pub fn gains(&self) -> usize {
+        if self.structure == Structure::SopdtZero { 2 } else { 1 }
+    }
+
+    /// Values of other gains and dynamics in these coordinates.
+    pub fn values_at(&self, gains: &[f64], point: Point) -> Vec<f64> {
+        let there = Self::new(self.structure, gains, point, Symmetric::zero(0));
+        let mut values = there.values;
+        if let Some(dead_time) = values.last_mut() {
+            *dead_time = point.dead_time_s / self.base_s;
+        }
+        values
+    }
+
     /// The dynamics as a point of the search.
     pub fn point(&self) -> Point {
         let (v, last) = (&self.values, self.values.len() - 1);

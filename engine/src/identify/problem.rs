@@ -9,6 +9,8 @@ use super::statistics::{is_even, mean, summed};
 const MIN_ROWS: usize = 10;
 /// A gap longer than this many sample times starts a segment with a free state.
 const GAP_SAMPLES: f64 = 3.0;
+/// Sizes of a column whose sums of squares, and differences of them, stay within what a number can hold.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// Stamps this close to an even grid, in sample times, are taken to lie on it.
 const UNIFORM_TOLERANCE: f64 = 1e-7;
 
@@ -173,6 +175,15 @@ impl<'a> FitProblem<'a> {
                 });
             }
         }
+        let measured = [(&o.pv_name, self.pv), (&o.mv_name, self.mv)];
+        for (column, values) in
+            measured.into_iter().chain(self.disturbances.iter().map(|d| (&d.name, d.values)))
+        {
+            let size = largest(values);
+            if size != 0.0 && !SIZES.contains(&size) {
+                return Err(FitError::OutOfScale { column: column.clone(), size });
+            }
+        }
         if let Some(i) = self.time_s.windows(2).position(|w| w[1] < w[0]) {
             return Err(FitError::TimeBackwards {
                 column: o.time_name.clone(),
@@ -186,6 +197,19 @@ impl<'a> FitProblem<'a> {
         }
         Ok(())
     }
+}
+
+/// Size of the largest value, in eight lanes.
+fn largest(values: &[f64]) -> f64 {
+    let mut lanes = [0.0_f64; 8];
+    let chunks = values.chunks_exact(8);
+    let rest = chunks.remainder().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for chunk in chunks {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane = lane.max(value.abs());
+        }
+    }
+    lanes.into_iter().fold(rest, f64::max)
 }
 
 fn is_constant(values: &[f64]) -> bool {

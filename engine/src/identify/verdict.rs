@@ -38,6 +38,11 @@ pub enum FitVerdict {
         /// Fit in percent.
         fit_percent: f64,
     },
+    /// The model leaves nothing but noise, which hides most of the PV's movement.
+    Noisy {
+        /// Fit in percent.
+        fit_percent: f64,
+    },
     /// The move was too small for the noise.
     GainUncertain {
         /// Half the 95 % interval of the gain, in percent of it.
@@ -57,6 +62,18 @@ pub enum FitVerdict {
         percent: f64,
         /// Move of the MV that would bring it to ±20 %, in MV units.
         mv_move: f64,
+    },
+    /// Nothing is known of a parameter.
+    ParameterUnknown {
+        /// `T`, `T2`, `zeta`, `Tz` or `L`.
+        name: &'static str,
+    },
+    /// The model rings, and leaves more than noise: a disturbance that swings looks the same.
+    Rings {
+        /// Period in seconds.
+        period_s: f64,
+        /// ζ.
+        zeta: f64,
     },
     /// The interval of L reaches 0.
     DeadTimeUnknown {
@@ -146,12 +163,24 @@ impl std::fmt::Display for FitVerdict {
                 "the fit is poor ({} %): the MV explains little of this PV's movement, or the structure is the wrong one",
                 n(*fit_percent)
             ),
+            Self::Noisy { fit_percent } => write!(
+                f,
+                "noise hides most of the PV's movement: the fit is {} %, and what the model leaves is noise; a larger move of the MV would stand out of it",
+                n(*fit_percent)
+            ),
             Self::GainUnknown => write!(
                 f,
                 "the PV does not answer the MV beyond doubt here: not even the sign of the gain can be told; move the MV further, or choose a stretch in which it moves"
             ),
+            Self::Rings { period_s, zeta } => write!(
+                f,
+                "the model rings with a period of {} s (damping {}): a disturbance that swings with it would look the same; compare with a stretch in which the MV stands still",
+                n(*period_s),
+                n(*zeta)
+            ),
             Self::GainUncertain { .. }
             | Self::ParameterUncertain { .. }
+            | Self::ParameterUnknown { .. }
             | Self::DeadTimeUnknown { .. }
             | Self::TimeConstantLong { .. }
             | Self::TimeConstantShort { .. } => self.write_parameter(f),
@@ -195,9 +224,12 @@ impl Explain for FitVerdict {
             Self::Disturbed { .. } => "verdict.disturbed",
             Self::DisturbanceUnknown { .. } => "verdict.disturbance_unknown",
             Self::Poor { .. } => "verdict.poor",
+            Self::Noisy { .. } => "verdict.noisy",
             Self::GainUncertain { .. } => "verdict.gain_uncertain",
             Self::GainUnknown => "verdict.gain_unknown",
             Self::ParameterUncertain { .. } => "verdict.parameter_uncertain",
+            Self::ParameterUnknown { .. } => "verdict.parameter_unknown",
+            Self::Rings { .. } => "verdict.rings",
             Self::DeadTimeUnknown { .. } => "verdict.dead_time_unknown",
             Self::TimeConstantLong { .. } => "verdict.time_constant_long",
             Self::TimeConstantShort { .. } => "verdict.time_constant_short",
@@ -225,7 +257,7 @@ impl Explain for FitVerdict {
                 vec![n("fit_percent", fit_percent), n("explained_percent", explained_percent)]
             }
             Self::DisturbanceUnknown { name } => vec![("name", name.clone())],
-            Self::Poor { fit_percent } => vec![n("fit_percent", fit_percent)],
+            Self::Poor { fit_percent } | Self::Noisy { fit_percent } => vec![n("fit_percent", fit_percent)],
             Self::GainUncertain { percent, mv_move, mv_moved } => {
                 vec![n("percent", percent), n("mv_move", mv_move), n("mv_moved", mv_moved)]
             }
@@ -233,6 +265,8 @@ impl Explain for FitVerdict {
             Self::ParameterUncertain { name, percent, mv_move } => {
                 vec![("name", (*name).to_owned()), n("percent", percent), n("mv_move", mv_move)]
             }
+            Self::ParameterUnknown { name } => vec![("name", (*name).to_owned())],
+            Self::Rings { period_s, zeta } => vec![n("period_s", period_s), n("zeta", zeta)],
             Self::DeadTimeUnknown { upper_s, mv_move } => {
                 vec![n("upper_s", upper_s), n("mv_move", mv_move)]
             }
@@ -276,6 +310,9 @@ impl FitVerdict {
                 n(*percent),
                 n(*mv_move)
             ),
+            Self::ParameterUnknown { name } => {
+                write!(f, "{name} is unknown: this stretch does not tell it")
+            }
             Self::DeadTimeUnknown { upper_s, mv_move } => write!(
                 f,
                 "the dead time is not identifiable here: it lies between 0 and {} s; a move of the MV by {} would tell it from 0",
@@ -330,9 +367,12 @@ impl FitVerdict {
             Self::Disturbed { fit_percent: 41.0, explained_percent: 92.0 },
             Self::DisturbanceUnknown { name: "feed".to_owned() },
             Self::Poor { fit_percent: 12.0 },
+            Self::Noisy { fit_percent: 31.0 },
             Self::GainUncertain { percent: 40.0, mv_move: 4.0, mv_moved: 1.0 },
             Self::GainUnknown,
             Self::ParameterUncertain { name: "T2", percent: 80.0, mv_move: 4.0 },
+            Self::ParameterUnknown { name: "T2" },
+            Self::Rings { period_s: 75.0, zeta: 0.12 },
             Self::DeadTimeUnknown { upper_s: 3.5, mv_move: 2.0 },
             Self::TimeConstantLong { time_constant_s: 900.0, span_s: 300.0 },
             Self::TimeConstantShort { time_constant_s: 0.01, sample_time_s: 0.2 },

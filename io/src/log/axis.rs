@@ -29,7 +29,8 @@ pub(super) struct Axis {
 /// Finds and puts in order the time axis.
 ///
 /// # Errors
-/// [`ImportError::NoSuchTimeColumn`] for a column the user named that is not there.
+/// [`ImportError::NoSuchTimeColumn`] for a column the user named that is not there; [`ImportError::TimeStandsStill`]
+/// where the time column holds one value, and no sample time was given.
 pub(super) fn find(
     read: &Read,
     options: &ImportOptions,
@@ -43,6 +44,22 @@ pub(super) fn find(
         }
         None => choose(read),
     };
+    // A PV that rises evenly passes for a clock; a column named as one goes before.
+    let by_behaviour = options.time_column.is_none()
+        && columns
+            .first()
+            .is_none_or(|&i| read.columns[i].kind == Kind::Number && !is_time_name(&read.names[i]));
+    let still = by_behaviour.then(|| still_clock(read)).flatten().or_else(|| {
+        let first = *columns.first()?;
+        (columns.len() == 1 && stands_still(&read.columns[first].values)).then_some(first)
+    });
+    if let (Some(column), None) = (still, options.sample_time_s) {
+        return Err(ImportError::TimeStandsStill {
+            name: read.names[column].clone(),
+            rows: read.lines.len(),
+        });
+    }
+    let columns = if still.is_some() { Vec::new() } else { columns };
     let Some(&first) = columns.first() else {
         let sample_time_s = options.sample_time_s.filter(|h| h.is_finite() && *h > 0.0);
         let assumed = sample_time_s.is_none();
@@ -102,6 +119,18 @@ fn choose(read: &Read) -> Vec<usize> {
         }
         [first, ..] => vec![first],
     }
+}
+
+/// A column of numbers with the name of a time, a word and no letter, that never moves.
+fn still_clock(read: &Read) -> Option<usize> {
+    (0..read.columns.len()).find(|&i| {
+        let named = is_time_name(&read.names[i]) && read.names[i].chars().count() > 1;
+        named && read.columns[i].kind == Kind::Number && stands_still(&read.columns[i].values)
+    })
+}
+
+fn stands_still(values: &[f64]) -> bool {
+    values.len() > 1 && values.iter().all(|t| *t == values[0])
 }
 
 fn is_time_name(name: &str) -> bool {

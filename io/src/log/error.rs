@@ -35,6 +35,16 @@ pub enum ImportError {
         /// Rows read.
         rows: usize,
     },
+    /// Every row carries the same time.
+    #[error(
+        "all {rows} rows carry the same time in column '{name}': name another column, or give the sample time"
+    )]
+    TimeStandsStill {
+        /// Column.
+        name: String,
+        /// Rows read.
+        rows: usize,
+    },
     /// A time column the user named is not there.
     #[error("there is no column '{name}' to take the time from: the file has {columns}")]
     NoSuchTimeColumn {
@@ -54,6 +64,7 @@ impl Explain for ImportError {
             Self::NoNumbers { .. } => "import.no_numbers",
             Self::OneRow { .. } => "import.one_row",
             Self::OnlyTime { .. } => "import.only_time",
+            Self::TimeStandsStill { .. } => "import.time_stands_still",
             Self::NoSuchTimeColumn { .. } => "import.no_such_time_column",
         }
     }
@@ -65,6 +76,9 @@ impl Explain for ImportError {
             Self::NoNumbers { lines } => vec![("lines", lines.to_string())],
             Self::OneRow { line } => vec![("line", line.to_string())],
             Self::OnlyTime { rows } => vec![("rows", rows.to_string())],
+            Self::TimeStandsStill { name, rows } => {
+                vec![("name", name.clone()), ("rows", rows.to_string())]
+            }
             Self::NoSuchTimeColumn { name, columns } => {
                 vec![("name", name.clone()), ("columns", columns.clone())]
             }
@@ -83,6 +97,7 @@ impl ImportError {
             Self::NoNumbers { lines: 12 },
             Self::OneRow { line: 2 },
             Self::OnlyTime { rows: 100 },
+            Self::TimeStandsStill { name: "time".to_owned(), rows: 250 },
             Self::NoSuchTimeColumn { name: "tempo".to_owned(), columns: "time, T1".to_owned() },
         ]
     }

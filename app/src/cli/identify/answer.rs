@@ -147,6 +147,12 @@ fn curve_text(curve: &ReactionCurve) -> String {
 }
 
 fn between(interval: [f64; 2]) -> String {
+    if interval.iter().any(|end| end.is_nan()) || interval[1] == f64::INFINITY && interval[0] <= 0.0 {
+        return "unknown".to_owned();
+    }
+    if interval[1] == f64::INFINITY {
+        return format!("from {}", number(interval[0]));
+    }
     format!("{} to {}", number(interval[0]), number(interval[1]))
 }
 

@@ -5,8 +5,8 @@ mod answer;
 use std::path::{Path, PathBuf};
 
 use vasos_engine::identify::{
-    Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModelFit, Structure, StudyOptions,
-    study_loop,
+    Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModeColumn, ModelFit, Structure,
+    StudyOptions, study_loop,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
 use vasos_io::log::{ImportOptions, ImportedLog, import_log};
@@ -118,7 +118,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     problem.options = fit_options;
     let others = chosen.disturbances.iter().zip(&rows.columns[2..]);
     problem.disturbances = others.map(|(name, values)| Disturbance { name: name.clone(), values }).collect();
-    let record = LoopRecord { problem, sp: stretch.sp.as_deref(), mode: stretch.mode.as_deref() };
+    let record = LoopRecord { problem, sp: stretch.sp.as_deref(), mode: stretch.mode() };
     let study = study_loop(&record, &options).map_err(Refusal::of)?;
     if let Err(error) = &study.choice
         && !matches!(error, FitError::NothingToFit { .. })
@@ -206,6 +206,8 @@ struct Stretch {
     rows: CompleteRows,
     sp: Option<Vec<f64>>,
     mode: Option<Vec<f64>>,
+    /// Words of the mode, where its column holds words.
+    mode_words: Vec<String>,
     /// Line of the file the first row came from.
     first_row: usize,
 }
@@ -218,6 +220,9 @@ impl Stretch {
             columns.push(column(name)?);
         }
         let (from_s, to_s) = (arguments.from.unwrap_or(0.0), arguments.to.unwrap_or(f64::INFINITY));
+        if from_s.is_nan() || to_s.is_nan() || from_s >= to_s {
+            return Err(Refusal(format!("--from {from_s} must be less than --to {to_s}")));
+        }
         let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let rows = table.complete(&slices, from_s, to_s);
         // A setpoint or mode that is missing here and there holds its last value.
@@ -225,6 +230,17 @@ impl Stretch {
             let Some(name) = name else { return Ok(None) };
             Ok(rows.held(&column(name)?))
         };
-        Ok(Self { sp: held(&chosen.sp)?, mode: held(&chosen.mode)?, first_row: rows.first_line(table), rows })
+        let words = |name: &String| table.columns.iter().find(|c| c.name == *name).map(|c| c.states.clone());
+        Ok(Self {
+            sp: held(&chosen.sp)?,
+            mode: held(&chosen.mode)?,
+            mode_words: chosen.mode.as_ref().and_then(words).unwrap_or_default(),
+            first_row: rows.first_line(table),
+            rows,
+        })
+    }
+
+    fn mode(&self) -> Option<ModeColumn<'_>> {
+        self.mode.as_deref().map(|values| ModeColumn { values, words: &self.mode_words })
     }
 }

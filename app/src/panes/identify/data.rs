@@ -5,7 +5,7 @@ use std::sync::Arc;
 use vasos_engine::document::{Document, FittedRows, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
 use vasos_engine::excitation::{ExcitationReport, identify_report};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, Structure, StudyOptions,
+    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, ModeColumn, Structure, StudyOptions,
     reaction_curve, study_loop,
 };
 use vasos_engine::signal::{ChannelKind, LogTable};
@@ -23,6 +23,7 @@ pub struct FitData {
     mv: Vec<f64>,
     sp: Option<Vec<f64>>,
     mode: Option<Vec<f64>>,
+    mode_words: Vec<String>,
     disturbance: Option<(String, Vec<f64>)>,
     options: FitOptions,
     structure: Option<Structure>,
@@ -42,7 +43,8 @@ impl FitData {
             .iter()
             .map(|(name, values)| Disturbance { name: name.clone(), values })
             .collect();
-        let record = LoopRecord { problem, sp: self.sp.as_deref(), mode: self.mode.as_deref() };
+        let mode = self.mode.as_deref().map(|values| ModeColumn { values, words: &self.mode_words });
+        let record = LoopRecord { problem, sp: self.sp.as_deref(), mode };
         let options = StudyOptions { structure: self.structure, ..StudyOptions::default() };
         let study = match study_loop(&record, &options) {
             Ok(study) => study,
@@ -110,6 +112,7 @@ fn of_log(log: &LogTable, roles: LogRoles, state: &State, stretch: Stretch) -> R
         mv: mv_values,
         sp,
         mode,
+        mode_words: column(roles.mode).map(|c| c.states.clone()).unwrap_or_default(),
         disturbance: other.map(|c| c.name.clone()).zip(values.next()),
         origin: ModelOrigin::Log { name: log.name.clone(), stretch },
         pv_unit: pv.unit.clone().unwrap_or_default(),
@@ -149,6 +152,7 @@ fn of_run(
         mv: take(mv.values()),
         sp: sp.filter(|sp| sp.iter().all(|v| v.is_finite())),
         mode: None,
+        mode_words: Vec::new(),
         disturbance: None,
         time_s,
         options: FitOptions {

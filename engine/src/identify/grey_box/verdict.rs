@@ -57,6 +57,16 @@ pub enum GreyBoxVerdict {
     },
 }
 
+impl GreyBoxVerdict {
+    /// Whether it says that the fit is of no use.
+    #[must_use]
+    pub fn is_refusal(&self) -> bool {
+        /// Fit in percent below which the rig follows nothing of the record.
+        const NOTHING_PERCENT: f64 = 20.0;
+        matches!(self, Self::Poor { fit_percent } if fit_percent.is_nan() || *fit_percent < NOTHING_PERCENT)
+    }
+}
+
 impl std::fmt::Display for GreyBoxVerdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let n = number;

@@ -3,6 +3,7 @@
 use super::fill::grams;
 use super::project::{Projected, Symmetric, project};
 use super::shape::{Linear, Order, Point, Shape};
+use crate::identify::damped::descend;
 use crate::identify::problem::Stretch;
 
 /// A step below this many standard errors changes nothing a reader could see.
@@ -13,7 +14,6 @@ const MANY_ROWS: usize = 5000;
 const STEP_AT_ROUNDING: f64 = 1e-12;
 /// Largest change of ln T, ln τ, ln ζ, L/T in a step.
 const LARGEST_STEP: f64 = 1.5;
-const LARGEST_DAMPING: f64 = 1e7;
 /// Where ζ may lie: a ring below the one never dies in a record, two time constants above the other are one.
 const ZETA: [f64; 2] = [0.01, 30.0];
 
@@ -95,31 +95,17 @@ pub(in crate::identify) fn refine_holding(
         points.iter().zip(&shape.channels).map(|(p, order)| bounds.clip(*order, *p)).collect()
     };
     *count += 1;
-    let mut best = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
+    let start = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
     let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
     let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
-    let mut damping = 1e-6;
-    for _ in 1..passes {
-        let reduced = Reduced::of(&best.projected, &held(shape, &best.points, fixed));
-        let step = reduced.step(damping);
-        let target = clip(&moved(shape, &best.points, &step));
-        let taken = difference(shape, &best.points, &target);
-        if reduced.is_small(&taken, best.rss() / spare, tolerance) {
-            break;
-        }
-        *count += 1;
-        match evaluate(stretch, shape, target, &best.projected.linear) {
-            Some(trial) if trial.rss() <= best.rss() => {
-                damping = (damping * 0.1).max(1e-12);
-                best = trial;
-            }
-            _ => damping = (damping * 30.0).max(1e-3),
-        }
-        if damping > LARGEST_DAMPING {
-            break;
-        }
-    }
-    Some(best)
+    let step = |at: &Found, damping: f64| {
+        let reduced = Reduced::of(&at.projected, &held(shape, &at.points, fixed));
+        let target = clip(&moved(shape, &at.points, &reduced.step(damping)));
+        let taken = difference(shape, &at.points, &target);
+        (!reduced.is_small(&taken, at.rss() / spare, tolerance)).then_some(target)
+    };
+    let pass = |target: Vec<Point>, best: &Found| evaluate(stretch, shape, target, &best.projected.linear);
+    Some(descend(start, passes, count, Found::rss, step, pass))
 }
 
 /// For each unknown: which way it may not go.

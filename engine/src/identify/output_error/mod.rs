@@ -15,7 +15,7 @@ mod search;
 mod shape;
 
 pub(super) use columns::dot;
-pub(super) use descend::{Found, evaluate};
+pub(super) use descend::{Found, evaluate, refine};
 pub(super) use fill::blocks;
 pub(super) use profile::{Around, dead_time_interval, is_wide};
 pub(super) use project::Symmetric;

@@ -1,18 +1,60 @@
 //! Finds the limits of an MV that was logged ahead of them.
+//!
+//! The squared residual over a pair of limits has more than one valley: a tight loop keeps its MV near rest and crosses
+//! its limits only in passing, and limits that are too narrow with a T that is too short explain much of it as well. So
+//! a grid over both limits finds the valleys on a thinned-out copy, each is descended, and the deepest are descended
+//! again on all rows.
 
-use crate::identify::{FitProblem, fit_fopdt};
+use std::borrow::Cow;
 
-/// Rows of the copy on which limits are tried.
+use super::clip_fit::{LimitsFit, clipped, descend, without_idle};
+use super::valve::{Valve, holding_cost};
+use crate::identify::fit_structure::shape_of;
+use crate::identify::output_error::{Near, Point, Shape, Work, search};
+use crate::identify::problem::Stretch;
+use crate::identify::{FitProblem, Structure};
+
+/// Rows of the copy on which the grid is tried.
 const ROWS: usize = 700;
-/// Quantiles of the MV that are tried as limits, both ends included.
-const QUANTILES: usize = 9;
+/// Parts into which the grid cuts the rows of the MV, and its range: a limit may lie where few rows do.
+const PARTS: usize = 7;
+/// Valleys descended on the copy, and on all rows.
+const VALLEYS: [usize; 2] = [10, 3];
+/// Limits closer than this part of their distance are the same.
+const ALIKE: f64 = 0.02;
 /// The squared residual must fall to this part, or the limits explain nothing.
 const FALL: f64 = 0.5;
+/// The same against a model with as many more parameters as there are limits.
+const FALL_OF_LARGER: f64 = 0.8;
 /// A fit this good leaves limits nothing to explain, in percent.
 const GOOD_PERCENT: f64 = 99.0;
 
-/// Limits at which the PV stops following the MV; `None` where it follows throughout.
-pub(super) fn limits(problem: &FitProblem) -> Option<[f64; 2]> {
+/// Limits at which the PV stops following the MV.
+#[derive(Debug, Clone)]
+pub(super) struct Limits {
+    /// Those that explain the PV best, in MV units.
+    pub best: [f64; 2],
+    /// Others that explain it nearly as well, with their squared residual as a multiple of the best one's.
+    pub others: Vec<([f64; 2], f64)>,
+}
+
+/// What stands between the MV of a log and what the process got.
+#[derive(Debug, Clone)]
+pub(super) enum Seen {
+    /// Nothing that explains much.
+    Nothing,
+    /// Limits behind the log.
+    Limits(Limits),
+    /// A valve that moves only once it was asked for that much, in MV units.
+    Holds(f64),
+}
+
+/// Looks for limits behind the log, and for a valve that sticks, which cuts the tops of a slow wave as limits do.
+pub(super) fn look(problem: &FitProblem) -> Seen {
+    look_closely(problem).unwrap_or(Seen::Nothing)
+}
+
+fn look_closely(problem: &FitProblem) -> Option<Seen> {
     let mut sorted = problem.mv.to_vec();
     sorted.sort_by(f64::total_cmp);
     let mut levels = sorted.clone();
@@ -21,67 +63,113 @@ pub(super) fn limits(problem: &FitProblem) -> Option<[f64; 2]> {
     if levels.len() < 30 || problem.pv.len() < 50 || !problem.disturbances.is_empty() {
         return None;
     }
-    let factor = problem.pv.len().div_ceil(ROWS);
-    let every = |values: &[f64]| values.iter().copied().step_by(factor).collect::<Vec<f64>>();
-    let (time_s, pv) = (every(problem.time_s), every(problem.pv));
-    // The mean of what the valve got, not of what it was asked for: limits come before thinning out.
-    let thinned = |limits: [f64; 2]| -> Vec<f64> {
-        let held = |rows: &[f64]| {
-            rows.iter().map(|u| u.clamp(limits[0], limits[1])).sum::<f64>() / rows.len() as f64
-        };
-        problem.mv.chunks(factor).map(held).collect()
-    };
-    let cost = |limits: [f64; 2]| -> f64 {
-        let fit = fit_fopdt(&FitProblem::new(&time_s, &pv, &thinned(limits)));
-        fit.map_or(f64::INFINITY, |fit| fit.mse)
-    };
+    let stretch = problem.stretch().ok()?;
+    let factor = stretch.len().div_ceil(ROWS);
+    let short = mended(&stretch);
+    let shape = shape_of(&stretch, Structure::Fopdt, false);
     let whole = [sorted[0], sorted[sorted.len() - 1]];
-    let plain = fit_fopdt(&FitProblem::new(&time_s, &pv, &thinned(whole))).ok()?;
-    if plain.fit_percent > GOOD_PERCENT {
+    let cost = |limits: [f64; 2]| tried(&clipped(&short, limits, factor), &shape);
+    let (plain, plain_point) = cost(whole)?;
+    if fit_percent(&clipped(&short, whole, factor), plain) > GOOD_PERCENT {
         return None;
     }
-    let mut best = (plain.mse, whole);
-    // Both together first: with a valve that jumps between its limits neither alone explains anything.
-    let mut levels: Vec<f64> = (0..=QUANTILES).map(|i| sorted[(sorted.len() - 1) * i / QUANTILES]).collect();
-    // Zero is where many a limit lies.
-    levels.push(0.0);
-    levels.retain(|v| (whole[0]..=whole[1]).contains(v));
-    for &low in &levels {
-        for &high in levels.iter().filter(|&&high| high > low) {
-            let found = cost([low, high]);
-            if found < best.0 {
-                best = (found, [low, high]);
-            }
+    let mut valleys: Vec<(f64, [f64; 2], Point)> = vec![(plain, whole, plain_point)];
+    let levels = grid(&sorted);
+    // Both together: with a valve that jumps between its limits neither alone explains anything.
+    for (i, &low) in levels.iter().enumerate() {
+        for &high in &levels[i + 1..] {
+            valleys.extend(cost([low, high]).map(|(rss, point)| (rss, [low, high], point)));
         }
     }
-    let (found, limits) = refined(best, whole, cost);
+    valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let on_copy = deepest(&short, factor, &shape, &valleys, VALLEYS[0]);
+    let least = on_copy.first()?.rss;
+    if let Some(Valve { band, rss }) = holding_cost(&short, factor, |held| tried(held, &shape))
+        && rss < least
+    {
+        return (rss < FALL * plain).then_some(Seen::Holds(band));
+    }
+    if least > 1.5 * FALL * plain {
+        return None;
+    }
+    let starts: Vec<_> = on_copy.iter().map(|f| (f.rss, f.limits, f.found.points[0])).collect();
+    let found = deepest(&stretch, 1, &shape, &starts, VALLEYS[1]);
+    let best = without_idle(&stretch, &shape, found.first()?.clone());
+    // What a larger model explains without limits is no sign of any.
+    let without =
+        [(Structure::Fopdt, FALL), (Structure::SopdtZero, FALL_OF_LARGER)].map(|(structure, part)| {
+            let shape = shape_of(&stretch, structure, false);
+            let fit = search(&stretch, &shape, &Near::default(), &mut Work::default());
+            part * fit.map_or(f64::INFINITY, |f| f.rss())
+        });
     // A limit beyond which next to nothing lies is none.
-    let beyond = problem.mv.iter().filter(|u| !(limits[0]..=limits[1]).contains(*u)).count();
-    (found < FALL * plain.mse && 100 * beyond > problem.mv.len()).then_some(limits)
+    let beyond = problem.mv.iter().filter(|u| !(best.limits[0]..=best.limits[1]).contains(*u)).count();
+    (best.rss < without[0].min(without[1]) && 100 * beyond > problem.mv.len()).then(|| {
+        let others = found[1..].iter().map(|f| (f.limits, f.rss / best.rss)).collect();
+        Seen::Limits(Limits { best: best.limits, others })
+    })
 }
 
-/// Pattern search: each limit up and down by a step that shrinks where neither helps.
-fn refined(best: (f64, [f64; 2]), whole: [f64; 2], cost: impl Fn([f64; 2]) -> f64) -> (f64, [f64; 2]) {
-    const ROUNDS: usize = 14;
-    let (mut least, mut limits) = best;
-    let mut step = 0.2 * (limits[1] - limits[0]);
-    for _ in 0..ROUNDS {
-        let mut moved = false;
-        for side in [1, 0] {
-            for way in [step, -step] {
-                let mut trial = limits;
-                trial[side] = (trial[side] + way).clamp(whole[0], whole[1]);
-                if trial[0] < trial[1] && trial != limits {
-                    let found = cost(trial);
-                    if found < least {
-                        (least, limits, moved) = (found, trial, true);
-                    }
-                }
+/// Levels of the MV at which limits are tried; `sorted` holds its rows.
+fn grid(sorted: &[f64]) -> Vec<f64> {
+    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
+    let mut levels: Vec<f64> = (0..=PARTS).map(|i| sorted[(sorted.len() - 1) * i / PARTS]).collect();
+    levels.extend((1..PARTS).map(|i| low + (high - low) * i as f64 / PARTS as f64));
+    // Zero is where many a limit lies.
+    levels.push(0.0);
+    levels.retain(|v| (low..=high).contains(v));
+    levels.sort_by(f64::total_cmp);
+    levels.dedup_by(|a, b| *a - *b < 0.01 * (high - low));
+    levels
+}
+
+/// Squared residual and dynamics of the best first order.
+fn tried(stretch: &Stretch, shape: &Shape) -> Option<(f64, Point)> {
+    search(stretch, shape, &Near::default(), &mut Work::default()).map(|f| (f.rss(), f.points[0]))
+}
+
+fn fit_percent(stretch: &Stretch, rss: f64) -> f64 {
+    let movement: f64 = stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum();
+    100.0 * (1.0 - (rss / movement).sqrt())
+}
+
+/// A copy in which every row counts: those that did not hold the PV of the row before.
+fn mended<'a>(stretch: &Stretch<'a>) -> Stretch<'a> {
+    let mut out = stretch.clone();
+    if let Some(keep) = out.keep.take() {
+        let mut last = stretch.y_ref;
+        let y = stretch.y.iter().zip(keep.iter()).map(|(y, keep)| {
+            last = if *keep { *y } else { last };
+            last
+        });
+        out.y = Cow::Owned(y.collect());
+    }
+    out
+}
+
+/// Descends the first of some starts, no two alike; the deepest first.
+fn deepest(
+    stretch: &Stretch,
+    factor: usize,
+    shape: &Shape,
+    starts: &[(f64, [f64; 2], Point)],
+    count: usize,
+) -> Vec<LimitsFit> {
+    let mut found: Vec<LimitsFit> = Vec::new();
+    for (_, limits, point) in starts.iter().take(count) {
+        if let Some(fit) = descend(stretch, factor, shape, *limits, &[*point]) {
+            match found.iter_mut().find(|other| are_alike(other.limits, fit.limits)) {
+                Some(other) if fit.rss < other.rss => *other = fit,
+                Some(_) => {}
+                None => found.push(fit),
             }
         }
-        if !moved {
-            step *= 0.4;
-        }
     }
-    (least, limits)
+    found.sort_by(|a, b| a.rss.total_cmp(&b.rss));
+    found
+}
+
+fn are_alike(a: [f64; 2], b: [f64; 2]) -> bool {
+    let close = ALIKE * (a[1] - a[0]);
+    (a[0] - b[0]).abs() < close && (a[1] - b[1]).abs() < close
 }

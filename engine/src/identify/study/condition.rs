@@ -1,6 +1,7 @@
 //! Rows of a log that are no measurements: frozen, repeated, struck by a spike; and an MV at its limits.
 
 use super::finding::RecordFinding;
+use super::spikes::spikes;
 use crate::identify::statistics::resolution;
 
 /// What a look at the columns gives.
@@ -16,8 +17,21 @@ pub(super) struct Conditioned {
     pub findings: Vec<RecordFinding>,
 }
 
-/// Looks at a record of N rows; `first_row` is the number of the first for messages.
-pub(super) fn condition(time_s: &[f64], pv: &[f64], mv: &[f64], first_row: usize) -> Conditioned {
+/// A record of N rows.
+#[derive(Debug, Clone)]
+pub(super) struct Rows<'a> {
+    pub time_s: &'a [f64],
+    pub pv: &'a [f64],
+    pub mv: &'a [f64],
+    /// Rows in which a hand writes the MV, where the log says.
+    pub manual: Option<Vec<bool>>,
+    /// Number of the first row, for messages.
+    pub first_row: usize,
+}
+
+/// Looks at a record.
+pub(super) fn condition(rows: &Rows) -> Conditioned {
+    let Rows { time_s, pv, mv, first_row, .. } = *rows;
     let mut keep = vec![true; pv.len()];
     let mut findings = Vec::new();
     let runs = runs(pv);
@@ -60,7 +74,7 @@ pub(super) fn condition(time_s: &[f64], pv: &[f64], mv: &[f64], first_row: usize
     if let Some(&row) = slips.first() {
         findings.push(RecordFinding::MvSlips { count: slips.len(), row: first_row + row, value: mv[row] });
     }
-    let saturated = at_limits(mended.as_deref().unwrap_or(mv), &mut findings);
+    let saturated = at_limits(mended.as_deref().unwrap_or(mv), rows.manual.as_deref(), &mut findings);
     Conditioned { keep, saturated, mv: mended, findings }
 }
 
@@ -109,7 +123,7 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     out
 }
 
-fn median(values: &mut [f64]) -> f64 {
+pub(super) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
@@ -167,68 +181,30 @@ fn frozen(time_s: &[f64], pv: &[f64], mv: &[f64], runs: &[(usize, usize)]) -> Op
     (!long.is_empty()).then_some(long)
 }
 
-/// Rows that leave their neighbours on both sides for three rows at most.
-fn spikes(pv: &[f64], keep: &[bool]) -> Vec<usize> {
-    const REACH: usize = 4;
-    /// Noise standard deviations that chance does not reach in a million rows, with room for tails.
-    const SIGMAS: f64 = 8.0;
-    /// Part of the record's own range below which nothing is a spike.
-    const RANGE: f64 = 0.02;
-    let rows: Vec<usize> = (0..pv.len()).filter(|&k| keep[k]).collect();
-    if rows.len() < 3 * REACH {
-        return vec![];
-    }
-    let value = |i: usize| pv[rows[i]];
-    let middle: Vec<f64> = (0..rows.len())
-        .map(|i| {
-            let (first, last) = (i.saturating_sub(REACH), (i + REACH).min(rows.len() - 1));
-            let mut window: Vec<f64> = (first..=last).map(value).collect();
-            median(&mut window)
-        })
-        .collect();
-    let mut distances: Vec<f64> = (0..rows.len()).map(|i| (value(i) - middle[i]).abs()).collect();
-    let distance = distances.clone();
-    let sigma = 1.4826 * median(&mut distances);
-    let mut sorted: Vec<f64> = rows.iter().map(|&k| pv[k]).collect();
-    sorted.sort_by(f64::total_cmp);
-    let range = sorted[sorted.len() * 98 / 100] - sorted[sorted.len() * 2 / 100];
-    let threshold = (SIGMAS * sigma).max(RANGE * range);
-    if threshold <= 0.0 {
-        return vec![];
-    }
-    (0..rows.len())
-        .filter(|&i| {
-            distance[i] > threshold && {
-                // On a step the values ahead and behind differ as well: no spike.
-                let (first, last) = (i.saturating_sub(REACH), (i + REACH).min(rows.len() - 1));
-                let calm = |j: usize| (value(j) - middle[i]).abs() < 0.3 * distance[i];
-                calm(first) && calm(last) && first < i && last > i
-            }
-        })
-        .map(|i| rows[i])
-        .collect()
-}
-
-/// Rows at the lowest or highest MV, where it stays there again and again while it moves elsewhere.
-fn at_limits(mv: &[f64], findings: &mut Vec<RecordFinding>) -> Vec<bool> {
+/// Rows at the lowest or highest MV, where it stays there again and again while it moves elsewhere; what a hand set is no
+/// limit.
+fn at_limits(mv: &[f64], manual: Option<&[bool]>, findings: &mut Vec<RecordFinding>) -> Vec<bool> {
+    /// A controller's output takes more values than this; a relay, a binary sequence or a hand takes fewer.
+    const LEVELS: usize = 12;
     let mut saturated = vec![false; mv.len()];
-    let runs = runs(mv);
-    // An MV of few levels is a hand's, not a controller's.
-    if runs.len() < 20 || 3 * runs.len() < mv.len() {
-        let moving: usize = runs.iter().filter(|r| r.1 == 1).count();
-        if moving < 20 {
-            return saturated;
-        }
+    let automatic: Vec<usize> = (0..mv.len()).filter(|&k| manual.is_none_or(|manual| !manual[k])).collect();
+    let written: Vec<f64> = automatic.iter().map(|&k| mv[k]).collect();
+    let runs = runs(&written);
+    let moving = runs.iter().filter(|r| r.1 == 1).count();
+    let mut levels = written.clone();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let few = runs.len() < 20 || 3 * runs.len() < written.len();
+    if levels.len() <= LEVELS || few && moving < 20 {
+        return saturated;
     }
-    let low = mv.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = mv.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    for limit in [low, high] {
+    for limit in [levels[0], levels[levels.len() - 1]] {
         let held: Vec<(usize, usize)> =
-            runs.iter().copied().filter(|r| mv[r.0] == limit && r.1 >= 3).collect();
+            runs.iter().copied().filter(|r| written[r.0] == limit && r.1 >= 3).collect();
         let rows: usize = held.iter().map(|r| r.1).sum();
-        if rows >= 5 && 200 * rows >= mv.len() {
-            for (flag, _) in saturated.iter_mut().zip(mv).filter(|(_, u)| **u == limit) {
-                *flag = true;
+        if rows >= 5 && 200 * rows >= written.len() {
+            for &k in automatic.iter().filter(|&&k| mv[k] == limit) {
+                saturated[k] = true;
             }
             findings.push(RecordFinding::MvAtLimit { limit, rows });
         }
@@ -241,6 +217,10 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_distr::Distribution;
+
+    fn look(time_s: &[f64], pv: &[f64], mv: &[f64], first_row: usize) -> Conditioned {
+        condition(&Rows { time_s, pv, mv, manual: None, first_row })
+    }
 
     fn noisy(rows: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
@@ -260,12 +240,12 @@ mod tests {
     #[test]
     fn a_clean_record_is_left_alone() {
         let (t, pv, mv) = noisy(900);
-        let found = condition(&t, &pv, &mv, 1);
+        let found = look(&t, &pv, &mv, 1);
         assert!(found.keep.iter().all(|k| *k) && found.findings.is_empty(), "{:?}", found.findings);
         // Without noise, too: a rest ahead of a step is no frozen sensor.
         let clean: Vec<f64> =
             t.iter().map(|t| if *t > 300.0 { -5.0 * (-(t - 300.0) / 40.0).exp_m1() } else { 0.0 }).collect();
-        let found = condition(&t, &clean, &mv, 1);
+        let found = look(&t, &clean, &mv, 1);
         assert!(found.keep.iter().all(|k| *k), "{:?}", found.findings);
     }
 
@@ -275,25 +255,25 @@ mod tests {
         for row in [100, 101, 500, 777] {
             pv[row] += 6.0;
         }
-        let found = condition(&t, &pv, &mv, 2);
+        let found = look(&t, &pv, &mv, 2);
         let out: Vec<usize> = (0..900).filter(|&k| !found.keep[k]).collect();
         assert_eq!(out, [100, 101, 500, 777]);
         assert!(matches!(found.findings[0], RecordFinding::Outliers { count: 4, row: 102, .. }));
         let step: Vec<f64> =
             pv.iter().enumerate().map(|(k, y)| if k > 600 { y + 50.0 } else { *y }).collect();
-        assert!((597..606).all(|k| condition(&t, &step, &mv, 1).keep[k]));
+        assert!((597..606).all(|k| look(&t, &step, &mv, 1).keep[k]));
     }
 
     #[test]
     fn a_slip_of_the_mv_is_mended_and_a_pulse_is_not() {
         let (t, pv, mut mv) = noisy(900);
         mv[500] = 500.0;
-        let found = condition(&t, &pv, &mv, 1);
+        let found = look(&t, &pv, &mv, 1);
         assert!(matches!(found.findings[..], [RecordFinding::MvSlips { count: 1, row: 501, .. }]));
         assert_eq!(found.mv.expect("mended")[500], 60.0);
         let (t, pv, mut mv) = noisy(900);
         mv[500] = 70.0;
-        assert!(condition(&t, &pv, &mv, 1).findings.is_empty());
+        assert!(look(&t, &pv, &mv, 1).findings.is_empty());
         // A pulse of one row is all that some records have.
         let pulse: Vec<f64> = (0..900).map(|k| if k == 300 { 1.0 } else { 0.0 }).collect();
         assert!(slips(&pulse).is_empty());
@@ -304,7 +284,7 @@ mod tests {
         let (t, mut pv, mv) = noisy(900);
         let held = pv[310];
         pv[310..370].fill(held);
-        let found = condition(&t, &pv, &mv, 1);
+        let found = look(&t, &pv, &mv, 1);
         assert!(
             matches!(found.findings[..], [RecordFinding::Frozen { rows: 59, times: 1, .. }]),
             "{:?}",
@@ -312,7 +292,7 @@ mod tests {
         );
         let (t, pv, mv) = noisy(900);
         let slow: Vec<f64> = (0..900).map(|k| pv[k - k % 4]).collect();
-        let found = condition(&t, &slow, &mv, 1);
+        let found = look(&t, &slow, &mv, 1);
         assert!(
             matches!(found.findings[..], [RecordFinding::Oversampled { rows: 4 }]),
             "{:?}",
@@ -325,7 +305,7 @@ mod tests {
     fn an_mv_at_its_limit_is_seen() {
         let (t, pv, _) = noisy(900);
         let mv: Vec<f64> = t.iter().map(|t| (50.0 + 80.0 * (t / 50.0).sin()).clamp(0.0, 100.0)).collect();
-        let found = condition(&t, &pv, &mv, 1);
+        let found = look(&t, &pv, &mv, 1);
         let limits: Vec<f64> = found
             .findings
             .iter()

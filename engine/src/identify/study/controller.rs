@@ -1,5 +1,6 @@
 //! The controller at work in a log: its gains from what it did.
 
+use super::condition::median;
 use crate::control::PidGains;
 use crate::identify::fopdt::Interval;
 use crate::identify::output_error::Symmetric;
@@ -24,6 +25,8 @@ pub struct ControllerFit {
     pub setpoint_weight: f64,
     /// Part of the MV's moves that the law explains.
     pub r2: f64,
+    /// Median of what the law leaves of a move, in MV units.
+    pub miss: f64,
     /// Moves regressed on.
     pub rows: usize,
     /// Rows from a PV to the MV that answers it.
@@ -129,6 +132,7 @@ fn regress(c: &Columns, stride: usize, lag: usize, b: f64) -> Option<ControllerF
         td_interval_95: td_s.map(|td| ratio(td, 2, false)),
         setpoint_weight: b,
         r2: solved.r2,
+        miss: solved.miss,
         rows: rows.len(),
         lag_rows: lag,
         stride,
@@ -169,6 +173,8 @@ struct Solved {
     /// Covariance with the first value.
     cross: [f64; COUNT],
     r2: f64,
+    /// Median size of what is left.
+    miss: f64,
 }
 
 fn solve(rows: &[Move], wanted: &[bool; COUNT]) -> Option<Solved> {
@@ -191,14 +197,17 @@ fn solve(rows: &[Move], wanted: &[bool; COUNT]) -> Option<Solved> {
         }
     }
     let inverse = matrix.inverse()?;
-    let mut out = Solved { values: [0.0; COUNT], errors: [0.0; COUNT], cross: [0.0; COUNT], r2: 0.0 };
+    let mut out =
+        Solved { values: [0.0; COUNT], errors: [0.0; COUNT], cross: [0.0; COUNT], r2: 0.0, miss: 0.0 };
     for (a, &i) in places.iter().enumerate() {
         out.values[i] = (0..size).map(|b| inverse.at(a, b) * rhs[b]).sum();
     }
-    let left: f64 = rows
+    let mut misses: Vec<f64> = rows
         .iter()
-        .map(|(x, y)| (y - places.iter().map(|&i| out.values[i] * x[i]).sum::<f64>()).powi(2))
-        .sum();
+        .map(|(x, y)| (y - places.iter().map(|&i| out.values[i] * x[i]).sum::<f64>()).abs())
+        .collect();
+    let left: f64 = misses.iter().map(|miss| miss * miss).sum();
+    out.miss = median(&mut misses);
     let variance = left / rows.len().saturating_sub(size).max(1) as f64;
     for (a, &i) in places.iter().enumerate() {
         out.errors[i] = (variance * inverse.at(a, a)).sqrt();

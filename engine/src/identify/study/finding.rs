@@ -58,6 +58,16 @@ pub enum RecordFinding {
         /// Rows beyond them.
         rows: usize,
     },
+    /// Other limits of the MV would explain the PV as well.
+    MvLimitsUnknown {
+        /// Limits taken, in MV units.
+        limits: [f64; 2],
+    },
+    /// The PV follows the MV as behind a valve that sticks or has play.
+    ValveHolds {
+        /// What the valve must be asked for to move, in MV units.
+        band: f64,
+    },
     /// The PV answers a move of the MV in its own row: the log writes the MV ahead of the PV.
     MvEarlier,
     /// The mode changes within the stretch.
@@ -66,8 +76,8 @@ pub enum RecordFinding {
         count: usize,
         /// Time of the first change, in seconds of the record.
         at_s: f64,
-        /// Mode in which the controller was read.
-        mode: f64,
+        /// Mode in which the controller was read, as the log writes it.
+        mode: String,
     },
     /// The loop swings.
     Oscillates {
@@ -135,15 +145,25 @@ impl std::fmt::Display for RecordFinding {
                 n(limits[0]),
                 n(limits[1])
             ),
+            Self::MvLimitsUnknown { limits } => write!(
+                f,
+                "the limits of the MV ({} and {}) cannot be told from this stretch, and T and L depend on them: give them with --mv-min and --mv-max",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            Self::ValveHolds { band } => write!(
+                f,
+                "the PV follows the MV as behind a valve that moves only once it was asked for about {}: it sticks or has play, and the model holds for larger moves only",
+                n(*band)
+            ),
             Self::MvEarlier => write!(
                 f,
                 "the PV answers a move of the MV in its own row: the log writes the MV ahead of the PV, and each MV was taken one row earlier"
             ),
             Self::ModeChanges { count, at_s, mode } => write!(
                 f,
-                "the mode changes {count} times, first at {} s; the controller was read in mode {}",
-                n(*at_s),
-                n(*mode)
+                "the mode changes {count} times, first at {} s; the controller was read in mode {mode}",
+                n(*at_s)
             ),
             Self::Oscillates { period_s, index } => write!(
                 f,
@@ -181,6 +201,8 @@ impl Explain for RecordFinding {
             Self::Quantised { .. } => "record.quantised",
             Self::MvAtLimit { .. } => "record.mv_at_limit",
             Self::MvBeyondLimits { .. } => "record.mv_beyond_limits",
+            Self::MvLimitsUnknown { .. } => "record.mv_limits_unknown",
+            Self::ValveHolds { .. } => "record.valve_holds",
             Self::MvEarlier => "record.mv_earlier",
             Self::ModeChanges { .. } => "record.mode_changes",
             Self::Oscillates { .. } => "record.oscillates",
@@ -206,9 +228,11 @@ impl Explain for RecordFinding {
             Self::MvBeyondLimits { limits, rows } => {
                 vec![n("low", &limits[0]), n("high", &limits[1]), whole("rows", rows)]
             }
+            Self::MvLimitsUnknown { limits } => vec![n("low", &limits[0]), n("high", &limits[1])],
+            Self::ValveHolds { band } => vec![n("band", band)],
             Self::MvEarlier => vec![],
             Self::ModeChanges { count, at_s, mode } => {
-                vec![whole("count", count), n("at_s", at_s), n("mode", mode)]
+                vec![whole("count", count), n("at_s", at_s), ("mode", mode.clone())]
             }
             Self::Oscillates { period_s, index } => vec![n("period_s", period_s), n("index", index)],
             Self::Stiction { index, band, period_s } => {
@@ -230,6 +254,8 @@ impl RecordFinding {
                 | Self::WrongSign { .. }
                 | Self::UnstableTuning { .. }
                 | Self::MvBeyondLimits { .. }
+                | Self::MvLimitsUnknown { .. }
+                | Self::ValveHolds { .. }
         )
     }
 
@@ -244,8 +270,10 @@ impl RecordFinding {
             Self::Quantised { step: 0.35 },
             Self::MvAtLimit { limit: 100.0, rows: 42 },
             Self::MvBeyondLimits { limits: [0.0, 60.0], rows: 250 },
+            Self::MvLimitsUnknown { limits: [35.0, 49.0] },
+            Self::ValveHolds { band: 1.4 },
             Self::MvEarlier,
-            Self::ModeChanges { count: 5, at_s: 320.0, mode: 1.0 },
+            Self::ModeChanges { count: 5, at_s: 320.0, mode: "AUTO".to_owned() },
             Self::Oscillates { period_s: 210.0, index: 0.35 },
             Self::Stiction { index: 0.82, band: 1.4, period_s: 330.0 },
             Self::WrongSign { kc: -2.5, gain: 4.1 },

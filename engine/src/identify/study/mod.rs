@@ -5,24 +5,32 @@
 //! reasoned no instead of a model.
 
 mod clip;
+mod clip_fit;
 mod condition;
 mod controller;
+mod feedback;
 mod finding;
+mod limited;
+mod mode;
+mod spikes;
 mod stiction;
+mod valve;
 
 use std::borrow::Cow;
 
 pub use controller::ControllerFit;
 pub use finding::RecordFinding;
+pub use mode::ModeColumn;
 pub use stiction::Oscillation;
 
 use super::{
-    Choice, FitError, FitProblem, FitVerdict, ReactionCurve, ReactionCurveError, Structure, choose_among,
-    choose_from_rest, reaction_curve,
+    Choice, FitError, FitProblem, ReactionCurve, ReactionCurveError, Structure, choose_among, reaction_curve,
 };
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
-use condition::{condition, mended, slips};
+use condition::{Rows, condition, mended, slips};
+use feedback::{controller_of, is_by_hand, refuse_feedback};
+use limited::Limited;
 
 /// What is asked of a study.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -42,8 +50,8 @@ pub struct LoopRecord<'a> {
     pub problem: FitProblem<'a>,
     /// Setpoint, N rows.
     pub sp: Option<&'a [f64]>,
-    /// Mode as the log codes it, N rows.
-    pub mode: Option<&'a [f64]>,
+    /// Mode, N rows.
+    pub mode: Option<ModeColumn<'a>>,
 }
 
 /// What a stretch of a loop's log says.
@@ -84,7 +92,13 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     let (mended_mv, mended_sp);
     let mut record = record.clone();
     if !options.as_is {
-        let seen = condition(problem.time_s, problem.pv, problem.mv, problem.options.first_row);
+        let seen = condition(&Rows {
+            time_s: problem.time_s,
+            pv: problem.pv,
+            mv: problem.mv,
+            manual: record.mode.map(|mode| mode.manual()),
+            first_row: problem.options.first_row,
+        });
         saturated = seen.saturated;
         findings = seen.findings;
         if problem.keep.is_none() && seen.keep.iter().any(|k| !k) {
@@ -99,22 +113,20 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
             record.sp = Some(&mended_sp);
         }
     }
-    let clipped;
-    if let Some(limits) = options.mv_limits.or_else(|| clip_limits(&problem, options)) {
-        clipped = problem.mv.iter().map(|u| u.clamp(limits[0], limits[1])).collect::<Vec<f64>>();
-        let beyond = problem.mv.iter().zip(&clipped).filter(|(a, b)| a != b).count();
-        if beyond > 0 {
-            findings.push(RecordFinding::MvBeyondLimits { limits, rows: beyond });
-            for (flag, (a, b)) in saturated.iter_mut().zip(problem.mv.iter().zip(&clipped)) {
-                *flag |= a != b;
-            }
-            problem.mv = &clipped;
-        }
-    }
-    let controller = controller_of(&record, &problem, &saturated, &mut findings);
     let structures = options.structure.map_or(Structure::CHOICE.to_vec(), |structure| vec![structure]);
-    let (mut choice, initial_state) = choose_from_rest(&problem, &structures);
+    let Limited { mv: kept, mut choice, initial_state } =
+        limited::choose(&problem, &structures, options, &mut findings);
+    if let Some(kept) = &kept {
+        for (flag, (a, b)) in saturated.iter_mut().zip(problem.mv.iter().zip(kept)) {
+            *flag |= a != b;
+        }
+        problem.mv = kept;
+    }
     problem.options.initial_state = initial_state;
+    let mut controller = controller_of(&record, &problem, &saturated, &mut findings);
+    if let Ok(choice) = &choice {
+        controller = controller.filter(|c| !is_by_hand(c, &problem, record.problem.mv, &choice.fits));
+    }
     if let Ok(choice) = &mut choice {
         refuse_feedback(&record, &problem, controller.as_ref(), choice);
     }
@@ -165,7 +177,7 @@ fn answered_in_the_same_row(
 
 fn check_length(record: &LoopRecord) -> Result<(), FitError> {
     let rows = record.problem.time_s.len();
-    for column in [record.sp, record.mode].into_iter().flatten() {
+    for column in [record.sp, record.mode.map(|mode| mode.values)].into_iter().flatten() {
         if column.len() != rows {
             return Err(FitError::LengthMismatch {
                 time: rows,
@@ -177,103 +189,6 @@ fn check_length(record: &LoopRecord) -> Result<(), FitError> {
         }
     }
     Ok(())
-}
-
-fn clip_limits(problem: &FitProblem, options: &StudyOptions) -> Option<[f64; 2]> {
-    if options.as_is { None } else { clip::limits(problem) }
-}
-
-/// The controller, read in the mode in which it explains the MV best.
-fn controller_of(
-    record: &LoopRecord,
-    problem: &FitProblem,
-    saturated: &[bool],
-    findings: &mut Vec<RecordFinding>,
-) -> Option<ControllerFit> {
-    let rows = problem.time_s.len();
-    let sample_time_s = sample_time(problem.time_s);
-    let keep = |k: usize| problem.keep.as_ref().is_none_or(|keep| keep[k]);
-    let in_mode = |mode: Option<f64>| -> Option<ControllerFit> {
-        let usable: Vec<bool> = (0..rows)
-            .map(|k| {
-                keep(k)
-                    && !saturated[k]
-                    && mode.is_none_or(|m| record.mode.is_some_and(|column| column[k] == m))
-            })
-            .collect();
-        controller::fit_controller(&controller::Columns {
-            time_s: problem.time_s,
-            pv: problem.pv,
-            sp: record.sp,
-            mv: record.problem.mv,
-            usable: &usable,
-            sample_time_s,
-        })
-    };
-    let Some(column) = record.mode else { return in_mode(None) };
-    let mut modes = column.to_vec();
-    modes.sort_by(f64::total_cmp);
-    modes.dedup();
-    if modes.len() > 6 {
-        return in_mode(None);
-    }
-    let found = modes
-        .iter()
-        .filter_map(|&mode| in_mode(Some(mode)).map(|fit| (mode, fit)))
-        .max_by(|a, b| a.1.r2.total_cmp(&b.1.r2));
-    let changes: Vec<usize> = (1..rows).filter(|&k| column[k] != column[k - 1]).collect();
-    if let Some(&first) = changes.first() {
-        findings.push(RecordFinding::ModeChanges {
-            count: changes.len(),
-            at_s: problem.time_s[first],
-            mode: found.as_ref().map_or(column[0], |f| f.0),
-        });
-    }
-    found.map(|f| f.1)
-}
-
-/// Median step of the stamps.
-fn sample_time(time_s: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = time_s.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
-    if steps.is_empty() {
-        return 1.0;
-    }
-    let middle = steps.len() / 2;
-    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// A stretch in which the MV does nothing but answer the PV shows the controller, not the process.
-fn refuse_feedback(
-    record: &LoopRecord,
-    problem: &FitProblem,
-    controller: Option<&ControllerFit>,
-    choice: &mut Choice,
-) {
-    /// Part of the MV's moves that feedback explains where nothing else moves it.
-    const FEEDBACK: f64 = 0.7;
-    /// A setpoint that moves this seldom leaves disturbances the most of the record.
-    const FEW_MOVES: usize = 5;
-    /// Fit in percent from which a few moves of the setpoint do tell the process.
-    const TOLD_PERCENT: f64 = 75.0;
-    // What a few rows show, such as those ahead of a test, says nothing of the rest.
-    let rows = problem.time_s.len();
-    let throughout = |c: &&ControllerFit| 2 * c.rows * c.stride > rows;
-    let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK).filter(throughout) else { return };
-    let still = record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]));
-    let one_mode = record.mode.is_none_or(|mode| mode.iter().all(|m| *m == mode[0]));
-    let other_excitation = problem.disturbances.iter().any(|d| d.values.iter().any(|v| *v != d.values[0]));
-    if still && one_mode && !other_excitation {
-        choice.refuse(&FitVerdict::NoExcitation {
-            mv_name: problem.options.mv_name.clone(),
-            explained_percent: 100.0 * controller.r2,
-        });
-        return;
-    }
-    let setpoint_moves = record.sp.map_or(0, |sp| sp.windows(2).filter(|w| w[0] != w[1]).count());
-    let fit_percent = choice.chosen().fit_percent;
-    if !still && setpoint_moves < FEW_MOVES && fit_percent < TOLD_PERCENT && one_mode && !other_excitation {
-        choice.refuse(&FitVerdict::Disturbed { fit_percent, explained_percent: 100.0 * controller.r2 });
-    }
 }
 
 /// What model and controller say of each other.

@@ -1,0 +1,112 @@
+//! The process behind limits of its MV: known ones, or those that the log speaks for.
+
+use super::clip::{self, Seen};
+use super::{RecordFinding, StudyOptions, clip_fit};
+use crate::identify::{Choice, FitError, FitProblem, InitialState, Structure, choose_from_rest};
+
+/// A limit known to less than this part of the distance of both is none that the log tells.
+const UNKNOWN: f64 = 0.25;
+/// Logarithm of the likelihood ratio of two pairs of limits up to which the log does not tell them apart.
+const UNDECIDED: f64 = 6.0;
+
+/// Models of the process with the MV that it got.
+pub(super) struct Limited {
+    /// MV within its limits; absent where it is as logged.
+    pub mv: Option<Vec<f64>>,
+    pub choice: Result<Choice, FitError>,
+    pub initial_state: InitialState,
+}
+
+/// Chooses a model, behind limits where they are told or found.
+pub(super) fn choose(
+    problem: &FitProblem,
+    structures: &[Structure],
+    options: &StudyOptions,
+    findings: &mut Vec<RecordFinding>,
+) -> Limited {
+    if let Some(limits) = options.mv_limits {
+        return at(problem, limits, structures, findings);
+    }
+    match if options.as_is { Seen::Nothing } else { clip::look(problem) } {
+        Seen::Limits(found) => at_found(problem, &found, structures, findings),
+        Seen::Holds(band) => {
+            findings.push(RecordFinding::ValveHolds { band });
+            as_logged(problem, structures)
+        }
+        Seen::Nothing => as_logged(problem, structures),
+    }
+}
+
+fn as_logged(problem: &FitProblem, structures: &[Structure]) -> Limited {
+    let (choice, initial_state) = choose_from_rest(problem, structures);
+    Limited { mv: None, choice, initial_state }
+}
+
+fn within(problem: &FitProblem, [low, high]: [f64; 2], structures: &[Structure]) -> Limited {
+    let mv: Vec<f64> = problem.mv.iter().map(|u| u.clamp(low, high)).collect();
+    let mut kept = FitProblem { mv: &mv, ..problem.clone() };
+    kept.options.mv_before = kept.options.mv_before.map(|u| u.clamp(low, high));
+    let (choice, initial_state) = choose_from_rest(&kept, structures);
+    Limited { mv: Some(mv), choice, initial_state }
+}
+
+fn beyond(mv: &[f64], limits: [f64; 2]) -> usize {
+    mv.iter().filter(|u| !(limits[0]..=limits[1]).contains(*u)).count()
+}
+
+fn at(
+    problem: &FitProblem,
+    limits: [f64; 2],
+    structures: &[Structure],
+    findings: &mut Vec<RecordFinding>,
+) -> Limited {
+    let rows = beyond(problem.mv, limits);
+    if rows == 0 {
+        return as_logged(problem, structures);
+    }
+    findings.push(RecordFinding::MvBeyondLimits { limits, rows });
+    within(problem, limits, structures)
+}
+
+/// Limits found with a first order, descended again with the structure that is chosen behind them; their uncertainty
+/// goes into the intervals of the process.
+fn at_found(
+    problem: &FitProblem,
+    found: &clip::Limits,
+    structures: &[Structure],
+    findings: &mut Vec<RecordFinding>,
+) -> Limited {
+    let mut limits = found.best;
+    let mut out = within(problem, limits, structures);
+    let logged = |initial_state: InitialState| {
+        let mut logged = problem.clone();
+        logged.options.initial_state = initial_state;
+        logged
+    };
+    if let Ok(choice) = &out.choice
+        && let Some(better) = clip_fit::descend_with(&logged(out.initial_state), limits, choice.chosen())
+        && better != limits
+    {
+        limits = better;
+        out = within(problem, limits, structures);
+    }
+    findings.push(RecordFinding::MvBeyondLimits { limits, rows: beyond(problem.mv, limits) });
+    let Ok(choice) = &mut out.choice else { return out };
+    let logged = logged(out.initial_state);
+    let errors = choice
+        .fits
+        .iter_mut()
+        .map(|fit| clip_fit::allow_for_limits(&logged, limits, fit))
+        .collect::<Vec<_>>()[0];
+    let passed = [problem.mv.iter().any(|u| *u < limits[0]), problem.mv.iter().any(|u| *u > limits[1])];
+    let known = errors.is_some_and(|errors| {
+        (0..2).all(|i| !passed[i] || 2.0 * errors[i] < UNKNOWN * (limits[1] - limits[0]))
+    });
+    let fit = choice.chosen();
+    let rows = fit.rows as f64 / fit.tests.rows_per_independent;
+    let rival = found.others.iter().find(|(_, ratio)| rows * ratio.ln() < UNDECIDED).map(|(other, _)| *other);
+    if !known || rival.is_some() {
+        findings.push(RecordFinding::MvLimitsUnknown { limits });
+    }
+    out
+}

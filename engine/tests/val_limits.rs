@@ -1,0 +1,214 @@
+//! MVs logged ahead of their limits, made with a known truth: tight loops, several processes, seeds and limits.
+
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, StandardNormal};
+use vasos_engine::identify::{
+    Drift, FitProblem, LoopRecord, LoopStudy, RecordFinding, StudyOptions, study_loop,
+};
+
+/// A first order under PI whose wish is logged while the valve keeps to its limits; sampled at 1 s.
+#[derive(Debug, Clone, Copy)]
+struct Tight {
+    gain: f64,
+    time_constant_s: f64,
+    dead_time_s: usize,
+    kc: f64,
+    ti_s: f64,
+    /// Height of the setpoint's square wave and its half period in rows.
+    square: (f64, usize),
+    limits: [f64; 2],
+    noise: f64,
+    rows: usize,
+}
+
+impl Default for Tight {
+    fn default() -> Self {
+        Self {
+            gain: 2.0,
+            time_constant_s: 40.0,
+            dead_time_s: 5,
+            kc: 3.0,
+            ti_s: 40.0,
+            square: (12.0, 200),
+            limits: [35.0, 49.0],
+            noise: 0.1,
+            rows: 2000,
+        }
+    }
+}
+
+struct Record {
+    time_s: Vec<f64>,
+    pv: Vec<f64>,
+    mv: Vec<f64>,
+    sp: Vec<f64>,
+}
+
+impl Tight {
+    /// The MV rests at 40 with the PV at 0.
+    fn run(&self, seed: u64) -> Record {
+        let mut rng = StdRng::seed_from_u64(seed);
+        let a = f64::exp(-1.0 / self.time_constant_s);
+        let mut out = Record { time_s: vec![], pv: vec![], mv: vec![], sp: vec![] };
+        let (mut y, mut integral) = (0.0, 0.0);
+        let mut valve = vec![40.0; self.dead_time_s + 1];
+        for k in 0..self.rows {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            let pv = y + self.noise * normal;
+            let sp = if (k / self.square.1) % 2 == 1 { self.square.0 } else { 0.0 };
+            let e = sp - pv;
+            let wish = 40.0 + self.kc * (e + integral / self.ti_s);
+            let got = wish.clamp(self.limits[0], self.limits[1]);
+            // Clamped integral: the sum stands still while the wish drives further out.
+            if wish == got || (wish - got) * e < 0.0 {
+                integral += e;
+            }
+            valve.push(got);
+            let delayed = valve[valve.len() - 1 - self.dead_time_s];
+            y = a * y + (1.0 - a) * self.gain * (delayed - 40.0);
+            out.time_s.push(k as f64);
+            out.pv.push(pv);
+            out.mv.push(wish);
+            out.sp.push(sp);
+        }
+        out
+    }
+}
+
+fn study(r: &Record, sp: bool) -> LoopStudy {
+    let mut problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);
+    problem.options.drift = Drift::Auto;
+    let record = LoopRecord { problem, sp: sp.then_some(&r.sp[..]), mode: None };
+    study_loop(&record, &StudyOptions::default()).expect("a study")
+}
+
+fn limits(found: &LoopStudy) -> Option<[f64; 2]> {
+    found.findings.iter().find_map(|f| match f {
+        RecordFinding::MvBeyondLimits { limits, .. } => Some(*limits),
+        _ => None,
+    })
+}
+
+/// Truths in which the limits are reached in every move of the setpoint.
+fn truths() -> Vec<Tight> {
+    let base = Tight::default();
+    vec![
+        base,
+        Tight { kc: 4.0, square: (10.0, 200), limits: [34.0, 50.0], ..base },
+        Tight { kc: 5.0, square: (8.0, 150), limits: [36.0, 47.0], ..base },
+        Tight {
+            gain: 0.5,
+            time_constant_s: 60.0,
+            dead_time_s: 8,
+            kc: 8.0,
+            ti_s: 60.0,
+            square: (4.0, 250),
+            limits: [30.0, 52.0],
+            noise: 0.02,
+            rows: 3000,
+        },
+        Tight {
+            gain: 5.0,
+            time_constant_s: 25.0,
+            dead_time_s: 3,
+            kc: 1.0,
+            ti_s: 25.0,
+            square: (20.0, 120),
+            limits: [38.0, 46.0],
+            noise: 0.2,
+            rows: 1500,
+        },
+        Tight { limits: [0.0, 48.0], ..base },
+    ]
+}
+
+/// The search settled in a valley of limits too narrow with a T too short and a narrow interval: K = 2, T = 40 s with limits
+/// 35 and 49 gave T = 134 s behind 37.1 and 47.4, and limits of 34 and 50 were not seen in four records of six.
+#[test]
+fn val_limits_of_a_tight_loop_are_found_with_the_process() {
+    let (mut held, mut all) = (0, 0);
+    for truth in truths() {
+        for seed in 1..=6 {
+            let found = study(&truth.run(seed), true);
+            let limits = limits(&found).unwrap_or_else(|| panic!("no limits for {truth:?}, seed {seed}"));
+            let width = truth.limits[1] - truth.limits[0];
+            for i in 0..2 {
+                // A limit that few rows pass may stay unknown; then those rows lie at the end of the record's range.
+                let idle = truth.limits[i] < 10.0;
+                let off = (limits[i] - truth.limits[i]).abs();
+                assert!(off < 0.03 * width || idle, "{limits:?} for {truth:?}, seed {seed}");
+            }
+            let fit = found.choice.as_ref().expect("a model").chosen();
+            let true_values =
+                [("K", truth.gain), ("T_s", truth.time_constant_s), ("L_s", truth.dead_time_s as f64)];
+            for (name, value) in true_values {
+                let p = fit.parameter(name).expect("a parameter");
+                assert!((p.value / value - 1.0).abs() < 0.04, "{name} = {p:?} for {truth:?}, seed {seed}");
+                all += 1;
+                held += usize::from(p.interval_95[0] <= value && value <= p.interval_95[1]);
+            }
+        }
+    }
+    // 108 intervals of 95 %, those of one record not independent of each other.
+    assert!(100 * held >= 90 * all, "{held} of {all} intervals hold the truth");
+}
+
+/// Limits taken for known gave T to ±0.4 % where it is known to ±2 %.
+#[test]
+fn the_uncertainty_of_limits_is_in_the_intervals() {
+    let truth = Tight::default();
+    let r = truth.run(1);
+    let half = |study: &LoopStudy, name: &str| {
+        let p =
+            study.choice.as_ref().expect("a model").chosen().parameter(name).expect("a parameter").clone();
+        0.5 * (p.interval_95[1] - p.interval_95[0])
+    };
+    let problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);
+    let record = LoopRecord { problem, sp: Some(&r.sp), mode: None };
+    let told = StudyOptions { mv_limits: Some(truth.limits), ..StudyOptions::default() };
+    let told = study_loop(&record, &told).expect("a study");
+    let found = study(&r, true);
+    assert!(half(&found, "T_s") > 2.0 * half(&told, "T_s"));
+    assert!(half(&found, "K") >= half(&told, "K"));
+}
+
+/// A valve that sticks under an MV moved by hand as a sine: its staircase looks cut at both ends.
+fn sticking(band: f64, period_s: f64, seed: u64) -> Record {
+    let mut rng = StdRng::seed_from_u64(seed);
+    let a = f64::exp(-1.0_f64 / 20.0);
+    let mut out = Record { time_s: vec![], pv: vec![], mv: vec![], sp: vec![] };
+    let (mut y, mut valve) = (0.0, 50.0_f64);
+    let mut delayed = vec![50.0; 4];
+    for k in 0..2400 {
+        let normal: f64 = StandardNormal.sample(&mut rng);
+        let u = 50.0 + 10.0 * (std::f64::consts::TAU * f64::from(k) / period_s).sin();
+        if (u - valve).abs() > band {
+            valve = u;
+        }
+        out.time_s.push(f64::from(k));
+        out.pv.push(y + 0.1 * normal);
+        out.mv.push(u);
+        out.sp.push(0.0);
+        delayed.push(valve);
+        y = a * y + (1.0 - a) * 1.5 * (delayed[delayed.len() - 4] - 50.0);
+    }
+    out
+}
+
+/// An MV moved as a sine with a staircase in the PV was taken for one logged ahead of limits.
+#[test]
+fn a_sticking_valve_is_not_taken_for_limits() {
+    for (band, period_s) in [(3.0, 400.0), (5.0, 300.0), (6.0, 500.0), (2.0, 200.0), (8.0, 400.0)] {
+        for seed in 1..=3 {
+            let found = study(&sticking(band, period_s, seed), false);
+            assert_eq!(limits(&found), None, "band {band}, period {period_s}, seed {seed}");
+            let holds = found.findings.iter().find_map(|f| match f {
+                RecordFinding::ValveHolds { band } => Some(*band),
+                _ => None,
+            });
+            let holds = holds.unwrap_or_else(|| panic!("nothing for band {band}: {:?}", found.findings));
+            assert!((0.5..2.0).contains(&(holds / band)), "{holds} for {band}");
+        }
+    }
+}
