@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use vasos_engine::document::DocumentCommand;
 use vasos_engine::session::RigCommand;
 
+use crate::answers::Question;
 use crate::i18n::Language;
 use crate::panes::PaneKind;
 
@@ -67,6 +68,8 @@ pub enum Action {
     ExportTrend,
     /// Empty the log.
     ClearLog,
+    /// Work something out beside the window, unless it is known.
+    Ask(Box<Question>),
     /// Put words on the clipboard.
     Copy(String),
 }

@@ -7,6 +7,7 @@
 rust_i18n::i18n!("../assets/locales", fallback = "en");
 
 pub mod action;
+pub mod answers;
 pub mod cli;
 pub mod experiments;
 pub mod i18n;

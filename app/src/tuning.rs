@@ -2,13 +2,21 @@
 
 use vasos_engine::analyze::{Analysis, StepFigures, analyze, step_figures};
 use vasos_engine::control::PidGains;
-use vasos_engine::document::{Document, ModelEntry, ModelOrigin};
+use vasos_engine::document::{Document, ModelEntry, ModelOrigin, OptimumSettings};
 use vasos_engine::identify::ControllerFit;
 use vasos_engine::model::ProcessModel;
+use vasos_engine::tune::optimum::{
+    Certificate, DerivativeFilter, Objective, Optimum, OptimumError, OptimumProblem, Process, Wanted, optimum,
+};
 use vasos_engine::tune::{ControllerKind, Rule, RuleError, RuleOptions, RuleWarning, registry};
+
+use crate::answers::{Answers, Question, Reply};
+use crate::{i18n, tr};
 
 /// Name of the row of the tuning in use.
 pub const PRESENT: &str = "present";
+/// Name of the rows of the best gains.
+pub const OPTIMAL: &str = "optimal";
 
 /// A row that gave gains.
 #[derive(Debug, Clone)]
@@ -33,6 +41,8 @@ pub struct Row {
     pub analysis: Analysis,
     /// IAE and overshoot.
     pub figures: StepFigures,
+    /// Proof of the best gains.
+    pub certificate: Option<Certificate>,
 }
 
 /// A rule that gave none.
@@ -43,7 +53,33 @@ pub struct Refusal {
     /// Controller.
     pub kind: ControllerKind,
     /// Why.
-    pub error: RuleError,
+    pub why: Refused,
+}
+
+/// Why there are no gains.
+#[derive(Debug, Clone)]
+pub enum Refused {
+    /// A rule has none.
+    Rule(RuleError),
+    /// No gains meet the limits.
+    Optimum(OptimumError),
+    /// A pure integrator is best, which no controller with Kc and Ti can be.
+    IntegralAlone,
+    /// They are being worked out.
+    Pending,
+}
+
+impl Refused {
+    /// In the user's language.
+    #[must_use]
+    pub fn say(&self) -> String {
+        match self {
+            Self::Rule(error) => i18n::say(error),
+            Self::Optimum(error) => i18n::say(error),
+            Self::IntegralAlone => tr!("tune.integral_alone"),
+            Self::Pending => tr!("tune.pending"),
+        }
+    }
 }
 
 /// The table.
@@ -55,6 +91,8 @@ pub struct TuningTable {
     pub rows: Vec<Row>,
     /// Rules that gave nothing.
     pub refusals: Vec<Refusal>,
+    /// What has to be worked out before the table is whole.
+    pub questions: Vec<Question>,
     key: Option<Key>,
 }
 
@@ -64,18 +102,23 @@ struct Key {
     model: ProcessModel,
     tau_c_s: Vec<(String, f64)>,
     present: Option<PidGains>,
+    optimum: OptimumSettings,
+    /// Which of the questions were answered.
+    answered: [bool; 2],
 }
 
 impl TuningTable {
     /// Brings the table in line with the document and the loop in view; does nothing when it is.
-    pub fn update(&mut self, document: &Document, focus: usize) {
+    pub fn update(&mut self, document: &Document, focus: usize, answers: &Answers) {
         let Some(entry) = document.model() else {
             if self.key.is_some() {
                 *self = Self::default();
             }
             return;
         };
-        let key = key(document, entry, focus);
+        let mut key = key(document, entry, focus);
+        let questions = questions(&entry.model, &document.optimum);
+        key.answered = questions.each_ref().map(|q| q.as_ref().is_some_and(|q| answers.find(q).is_some()));
         if self.key.as_ref() == Some(&key) {
             return;
         }
@@ -86,6 +129,22 @@ impl TuningTable {
         if let Some(gains) = key.present {
             self.rows.push(judged(&entry.model, &old, PRESENT, gains));
         }
+        self.questions.clear();
+        for (kind, question) in [ControllerKind::Pi, ControllerKind::Pid].into_iter().zip(questions) {
+            let found = match question {
+                None => best(&entry.model, kind, &document.optimum),
+                Some(question) => match answers.find(&question).as_deref() {
+                    Some(Reply::Optimum(found)) => found.clone(),
+                    _ => {
+                        let why = Refused::Pending;
+                        self.refusals.push(Refusal { title_key: "rules.optimal", kind, why });
+                        self.questions.push(question);
+                        continue;
+                    }
+                },
+            };
+            self.take_best(&entry.model, &old, kind, found);
+        }
         for rule in registry() {
             for &kind in rule.controllers {
                 let options =
@@ -95,6 +154,30 @@ impl TuningTable {
         }
         self.model = Some(entry.model.clone());
         self.key = Some(key);
+    }
+
+    fn take_best(
+        &mut self,
+        model: &ProcessModel,
+        old: &[Row],
+        kind: ControllerKind,
+        found: Result<Optimum, OptimumError>,
+    ) {
+        let refused = match found {
+            Ok(found) => match found.ideal() {
+                Some(gains) => {
+                    let mut row = judged(model, old, OPTIMAL, gains);
+                    row.source = SOURCE;
+                    row.kind = kind;
+                    row.certificate = Some(found.certificate);
+                    self.rows.push(row);
+                    return;
+                }
+                None => Refused::IntegralAlone,
+            },
+            Err(error) => Refused::Optimum(error),
+        };
+        self.refusals.push(Refusal { title_key: "rules.optimal", kind, why: refused });
     }
 
     fn apply(
@@ -117,7 +200,9 @@ impl TuningTable {
                 row.valid = valid;
                 self.rows.push(row);
             }
-            Err(error) => self.refusals.push(Refusal { title_key: rule.title_key, kind, error }),
+            Err(error) => {
+                self.refusals.push(Refusal { title_key: rule.title_key, kind, why: Refused::Rule(error) })
+            }
         }
     }
 
@@ -155,7 +240,48 @@ fn key(document: &Document, entry: &ModelEntry, focus: usize) -> Key {
         model: entry.model.clone(),
         tau_c_s: document.tau_c_s.iter().map(|(k, v)| (k.clone(), *v)).collect(),
         present,
+        optimum: document.optimum,
+        answered: [false; 2],
     }
+}
+
+/// Where the best gains come from.
+const SOURCE: &str =
+    "Kristiansson, Lennartson, Evaluation and simple tuning of PID controllers, J. Process Control 16, 2006";
+
+/// The controller whose best gains are shown.
+#[must_use]
+pub fn wanted(kind: ControllerKind, settings: &OptimumSettings) -> Wanted {
+    if kind == ControllerKind::Pid { Wanted::pid(&settings.limits) } else { Wanted::Pi }
+}
+
+/// What takes longer than a frame may: simulated objectives, and a filter that is free.
+fn questions(model: &ProcessModel, settings: &OptimumSettings) -> [Option<Question>; 2] {
+    let simulated = matches!(settings.objective, Objective::IaeLoad | Objective::IaeSetpoint);
+    [ControllerKind::Pi, ControllerKind::Pid].map(|kind| {
+        let wanted = wanted(kind, settings);
+        let slow = simulated || wanted == Wanted::Pid(DerivativeFilter::Free);
+        slow.then(|| Question::Optimum {
+            model: model.clone(),
+            wanted,
+            limits: settings.limits,
+            objective: settings.objective,
+        })
+    })
+}
+
+fn best(
+    model: &ProcessModel,
+    kind: ControllerKind,
+    settings: &OptimumSettings,
+) -> Result<Optimum, OptimumError> {
+    let processes = [Process::Model(model.clone())];
+    optimum(&OptimumProblem {
+        processes: &processes,
+        wanted: wanted(kind, settings),
+        objective: settings.objective,
+        limits: settings.limits,
+    })
 }
 
 /// A row with its figures, taken from an older table where the gains are the same.
@@ -176,5 +302,6 @@ fn judged(model: &ProcessModel, old: &[Row], rule: &'static str, gains: PidGains
         valid: true,
         analysis,
         figures,
+        certificate: None,
     }
 }

@@ -373,6 +373,11 @@ fn other_rigs_languages_and_logs_look_as_they_did() {
 }
 
 fn picture(harness: &mut Window, name: &str) {
+    // What panes have asked for is worked out beside the window, one question after the other.
+    for _ in 0..3 {
+        harness.run_steps(2);
+        wait(harness, "answers", |w| !w.is_answering());
+    }
     // Software renderers of other versions differ by a little in antialiasing.
     let options = egui_kittest::SnapshotOptions::new().threshold(1.5).max_failed_pixels(1500);
     harness.snapshot_options(name, &options);
@@ -440,4 +445,64 @@ fn an_experiment_runs_beside_the_window() {
     wait(&mut harness, "the experiment", |w| w.experiments().results.contains_key("stad_figure_7"));
     assert!(harness.state().experiments().results["stad_figure_7"].reached());
     assert!(harness.query_by_label_contains("Reached: all").is_some());
+}
+
+/// The best gains follow the limits, and every picture of a tuning shows it.
+#[test]
+fn the_best_gains_follow_their_limits_and_every_view_shows_them() {
+    let mut results = egui_kittest::SnapshotResults::new();
+    let mut harness = window([1440.0, 900.0]);
+    act(&mut harness, typed_model());
+    harness.run_steps(3);
+    let best = |h: &Window| h.state().tuning().find("optimal", "pi").expect("the best PI").clone();
+    let first = best(&harness);
+    assert!((first.analysis.ms.expect("finite") / 1.4 - 1.0).abs() < 1e-6, "{first:?}");
+    let slider =
+        |h: &Window<'_>| h.get_by_role_and_label(eframe::egui::accesskit::Role::Slider, "Ms").focus();
+    slider(&harness);
+    harness.run_steps(2);
+    for _ in 0..6 {
+        harness.key_press(eframe::egui::Key::ArrowRight);
+        harness.run_steps(1);
+    }
+    harness.run_steps(2);
+    let limit = harness.state().document().optimum.limits.ms;
+    let second = best(&harness);
+    assert!(limit > 1.4 && (second.analysis.ms.expect("finite") / limit - 1.0).abs() < 1e-6, "{limit}");
+    assert!(second.analysis.jv < first.analysis.jv);
+    act(&mut harness, Action::Undo);
+    harness.run_steps(2);
+    assert_eq!(best(&harness).gains, first.gains, "one undo takes the limit back");
+    let candidate = Candidate { rule: "optimal".to_owned(), controller: "pi".to_owned(), gains: first.gains };
+    act(&mut harness, Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    harness.get_by_label("Where: Rig").click();
+    harness.get_by_label("View: Map").click();
+    harness.run_steps(3);
+    harness.remove_cursor();
+    picture(&mut harness, "tuning_1440x900");
+    for (pane, label, name) in [
+        (PaneKind::Tune, "View: Map", "tune_map"),
+        (PaneKind::Tune, "Axes of the map: Jv – Ju", "tune_map_ju"),
+        (PaneKind::Step, "Where: Rig", "step_rig"),
+    ] {
+        act(&mut harness, Action::Maximise(pane));
+        harness.run_steps(2);
+        harness.get_by_label(label).click();
+        harness.run_steps(3);
+        harness.remove_cursor();
+        picture(&mut harness, name);
+        act(&mut harness, Action::Maximise(pane));
+    }
+    act(&mut harness, Action::ToggleTheme);
+    act(&mut harness, Action::Maximise(PaneKind::Nyquist));
+    for view in ["Bode", "Nichols", "Gang of four", "Poles, zeros"] {
+        harness.run_steps(2);
+        harness.get_by_role(eframe::egui::accesskit::Role::ComboBox).click();
+        harness.run_steps(3);
+        harness.get_by_label(view).click();
+        harness.run_steps(3);
+        harness.remove_cursor();
+        picture(&mut harness, &format!("loop_{}", view.to_lowercase().replace([' ', ','], "_")));
+    }
+    results.extend_harness(&mut harness);
 }

@@ -18,6 +18,7 @@ use vasos_engine::document::Document;
 use vasos_engine::session::Snapshot;
 
 use crate::action::Action;
+use crate::answers::Answers;
 use crate::experiments::Desk;
 use crate::journal::Entry;
 use crate::traces::{LogTrace, RunTrace};
@@ -96,6 +97,8 @@ pub struct View<'a> {
     pub log: Option<&'a LogTrace>,
     /// Rules on the model in use.
     pub tuning: &'a TuningTable,
+    /// What was worked out beside the window.
+    pub answers: &'a Answers,
     /// Which of the loops identification and tuning are about.
     pub focus: usize,
     /// A fit is under way.

@@ -32,6 +32,35 @@ pub fn y_axis(name: impl Into<String>) -> AxisHints<'static> {
         .min_thickness(Y_WIDTH)
 }
 
+/// A horizontal axis of decimal logarithms, labelled with the numbers themselves.
+#[must_use]
+pub fn log_x_axis(name: impl Into<String>) -> AxisHints<'static> {
+    AxisHints::new_x().label(name.into()).label_spacing(spacing(X_SPACING)).formatter(power_label)
+}
+
+/// A vertical axis of decimal logarithms.
+#[must_use]
+pub fn log_y_axis(name: impl Into<String>) -> AxisHints<'static> {
+    y_axis(name).formatter(power_label)
+}
+
+/// Marks at 1, 2, 5 of every decade, or at whole decades where those are many.
+#[must_use]
+pub fn log_marks(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    if !(high > low && high - low < 60.0) {
+        return vec![];
+    }
+    let within = if high - low > 2.5 { &[1.0][..] } else { &[1.0, 2.0, 5.0] };
+    let decades = (low.floor() as i32)..=(high.ceil() as i32);
+    let marks = decades.flat_map(|d| within.iter().map(move |m| f64::from(d) + f64::log10(*m)));
+    marks.filter(|v| (low..=high).contains(v)).map(|value| GridMark { value, step_size: 1.0 }).collect()
+}
+
+fn power_label(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
+    crate::text::brief(10f64.powf(mark.value))
+}
+
 /// What egui_plot's recommended step stands for on the screen, in points.
 const RECOMMENDED: f64 = 8.0;
 /// Steps of a time axis in seconds; beyond them, whole multiples of ten hours.

@@ -90,6 +90,14 @@ impl Workbench {
             }
             Action::ExportTrend => self.export_trend(),
             Action::ClearLog => self.journal.clear(),
+            Action::Ask(question) => {
+                if self.answers.begins(&question) {
+                    self.beside.start("answer", move || {
+                        let reply = question.answer();
+                        Outcome::Answered(question, Box::new(reply))
+                    });
+                }
+            }
             Action::Copy(words) => ctx.copy_text(words),
         }
     }

@@ -130,9 +130,11 @@ impl Workbench {
                 Outcome::Recorded(path, rows) => {
                     self.tell(Weight::Note, tr!("event.recorded", rows = rows, path = path.display()));
                 }
+                Outcome::Answered(question, reply) => self.answers.take(*question, *reply),
                 Outcome::Cancelled => {}
                 Outcome::NoDialog => self.path_field = Some(String::new()),
                 Outcome::Failed(error) => {
+                    self.answers.give_up();
                     let words = i18n::say(&*error);
                     self.tell(Weight::Alarm, words.clone());
                     self.notice = Some(words);

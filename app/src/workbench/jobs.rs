@@ -12,6 +12,7 @@ use vasos_engine::explain::Explain;
 use vasos_engine::plant::Network;
 use vasos_io::log::ImportedLog;
 
+use crate::answers::{Question, Reply};
 use crate::experiments::Finished;
 
 /// A dialog that answers faster than any hand was never shown.
@@ -32,6 +33,8 @@ pub enum Outcome {
     Experiment(PathBuf, Arc<Experiment>),
     /// An experiment has ended.
     Ran(Box<Finished>),
+    /// A pane's question was worked out.
+    Answered(Box<Question>, Box<Reply>),
     /// A recording is complete, with so many rows.
     Recorded(PathBuf, u64),
     /// A file was chosen.

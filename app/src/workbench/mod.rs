@@ -19,6 +19,7 @@ use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
 use crate::action::Action;
+use crate::answers::Answers;
 use crate::experiments::Desk;
 use crate::i18n;
 use crate::journal::{self, Entry, Weight};
@@ -59,6 +60,7 @@ pub struct Workbench {
     jobs: Jobs,
     /// Work that nobody has to wait for: fits and imports go on meanwhile.
     beside: Jobs,
+    answers: Answers,
     desk: Desk,
     import: Option<ImportSheet>,
     recording: Option<vasos_io::recording::Recording>,
@@ -100,6 +102,7 @@ impl Workbench {
             states: States::default(),
             jobs: Jobs::new(ctx.clone()),
             beside: Jobs::new(ctx.clone()),
+            answers: Answers::default(),
             desk: Desk::default(),
             import: None,
             recording: None,
@@ -161,6 +164,12 @@ impl Workbench {
         self.run.take(block);
     }
 
+    /// Whether something that a pane has asked for is being worked out.
+    #[must_use]
+    pub fn is_answering(&self) -> bool {
+        self.answers.is_busy()
+    }
+
     /// Whether a fit or an import is under way.
     #[must_use]
     pub fn is_busy(&self) -> bool {
@@ -189,7 +198,10 @@ impl Workbench {
             journal::add(&mut self.journal, journal::of_event(&event));
         }
         self.take_results(ctx);
-        self.tuning.update(self.history.document(), self.states.faceplate.shown);
+        self.tuning.update(self.history.document(), self.states.faceplate.shown, &self.answers);
+        for question in self.tuning.questions.clone() {
+            self.act(ctx, Action::Ask(Box::new(question)));
+        }
         if let Some(recording) = &mut self.recording {
             for trouble in recording.troubles() {
                 let words = i18n::say(&trouble);
@@ -235,6 +247,7 @@ impl Workbench {
             kept: self.kept.as_ref(),
             log: self.log.as_ref(),
             tuning: &self.tuning,
+            answers: &self.answers,
             focus: self.states.faceplate.shown,
             fitting: self.jobs.is_busy(),
             experiments: &self.desk,

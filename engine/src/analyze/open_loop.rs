@@ -134,6 +134,18 @@ impl OpenLoop {
         (g_sqr * c_sqr, g_sqr, c_sqr)
     }
 
+    /// Poles of the rational part in rad/s: of the process and of the controller.
+    #[must_use]
+    pub fn poles(&self) -> &[Complex64] {
+        &self.poles
+    }
+
+    /// Zeros likewise.
+    #[must_use]
+    pub fn zeros(&self) -> &[Complex64] {
+        &self.zeros
+    }
+
     /// The controller's gains.
     #[must_use]
     pub fn gains(&self) -> &ParallelGains {

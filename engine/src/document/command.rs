@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::data::{
-    Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings,
-    SourceChoice, Stretch,
+    Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
+    RigSettings, SourceChoice, Stretch,
 };
 use crate::control::{GainsError, Law, LoopOptions, LoopSpec, Mode, PidTuning, check_filter, check_loop};
 use crate::explain::{Explain, number};
@@ -13,6 +13,7 @@ use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network, RigError};
 use crate::session::CommandError;
 use crate::signal::LogTable;
+use crate::tune::optimum::OptimumError;
 
 /// A change of the document.
 #[derive(Debug, Clone)]
@@ -59,6 +60,8 @@ pub enum DocumentCommand {
     Candidate(Option<Candidate>),
     /// Free time constant of a rule in seconds; `None` for its default.
     TauC(String, Option<f64>),
+    /// Objective and limits of the best gains.
+    Optimum(OptimumSettings),
 }
 
 /// A model that joins the list.
@@ -103,6 +106,9 @@ pub enum DocumentError {
         /// Offending value in seconds.
         value: f64,
     },
+    /// Limits that cannot be used.
+    #[error(transparent)]
+    Optimum(OptimumError),
 }
 
 impl Explain for DocumentError {
@@ -112,6 +118,7 @@ impl Explain for DocumentError {
             Self::SameColumn => "document.same_column",
             Self::EmptyStretch { .. } => "document.empty_stretch",
             Self::TauC { .. } => "document.tau_c",
+            Self::Optimum(error) => error.key(),
         }
     }
 
@@ -121,6 +128,7 @@ impl Explain for DocumentError {
             Self::SameColumn => vec![],
             Self::EmptyStretch { from_s, to_s } => vec![("from_s", number(*from_s)), ("to_s", number(*to_s))],
             Self::TauC { value } => vec![("value", number(*value))],
+            Self::Optimum(error) => error.args(),
         }
     }
 }
@@ -158,6 +166,7 @@ impl DocumentCommand {
             Self::RemoveModel(_) => "remove_model",
             Self::Candidate(_) => "candidate",
             Self::TauC(..) => "tau_c",
+            Self::Optimum(_) => "optimum",
         }
     }
 
@@ -172,7 +181,7 @@ impl DocumentCommand {
             | Self::Law(tag, _)
             | Self::Options(tag, _)
             | Self::PvFilter(tag, _) => Some(format!("{} {tag}", self.key())),
-            Self::Stretch(_) | Self::Candidate(_) => Some(self.key().to_owned()),
+            Self::Stretch(_) | Self::Candidate(_) | Self::Optimum(_) => Some(self.key().to_owned()),
             _ => None,
         }
     }
@@ -245,6 +254,10 @@ impl Document {
                     return Err(DocumentError::TauC { value: *value });
                 }
                 next.tau_c_s.insert(rule.clone(), *value);
+            }
+            DocumentCommand::Optimum(settings) => {
+                settings.limits.validated().map_err(DocumentError::Optimum)?;
+                next.optimum = *settings;
             }
             DocumentCommand::TauC(rule, None) => {
                 next.tau_c_s.remove(rule);

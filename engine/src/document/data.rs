@@ -9,6 +9,7 @@ use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
 use crate::session::Rig;
 use crate::signal::LogTable;
+use crate::tune::optimum::{LoopLimits, Objective};
 
 /// Settings of one loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -226,6 +227,21 @@ pub struct Candidate {
     pub gains: PidGains,
 }
 
+/// What the best gains are sought for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OptimumSettings {
+    /// What is made best.
+    pub objective: Objective,
+    /// Limits it keeps.
+    pub limits: LoopLimits,
+}
+
+impl Default for OptimumSettings {
+    fn default() -> Self {
+        Self { objective: Objective::Jv, limits: LoopLimits::DEFAULT }
+    }
+}
+
 /// Everything the user works on.
 #[derive(Debug, Clone)]
 pub struct Document {
@@ -247,6 +263,8 @@ pub struct Document {
     pub candidate: Option<Candidate>,
     /// Free time constants by rule, in seconds; absent: the rule's default.
     pub tau_c_s: BTreeMap<String, f64>,
+    /// Objective and limits of the best gains.
+    pub optimum: OptimumSettings,
 }
 
 impl Document {
@@ -263,6 +281,7 @@ impl Document {
             model_in_use: None,
             candidate: None,
             tau_c_s: BTreeMap::new(),
+            optimum: OptimumSettings::default(),
         }
     }
 

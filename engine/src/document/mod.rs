@@ -11,8 +11,8 @@ mod sync;
 
 pub use command::{DocumentCommand, DocumentError, NewModel};
 pub use data::{
-    Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, RigSettings,
-    SourceChoice, Stretch,
+    Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
+    RigSettings, SourceChoice, Stretch,
 };
 pub use history::History;
 pub use sync::{Consequence, rig_commands};

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::error::OptimumError;
 use crate::analyze::FrequencyResponse;
 use crate::control::PidGains;
 use crate::model::ProcessModel;
@@ -72,6 +73,25 @@ pub struct LoopLimits {
 impl LoopLimits {
     /// Ms = 1.4, the customary compromise, without limits on Mt and Ju.
     pub const DEFAULT: Self = Self { ms: 1.4, mt: f64::INFINITY, ju: f64::INFINITY };
+
+    /// Checks Ms > 1, Mt ≥ 1, Ju > 0, and that one of them is a limit at all.
+    ///
+    /// # Errors
+    /// [`OptimumError`] with the offending value.
+    pub fn validated(self) -> Result<Self, OptimumError> {
+        let Self { ms, mt, ju } = self;
+        if ms.is_nan() || ms <= 1.0 {
+            return Err(OptimumError::Ms { value: ms });
+        }
+        if mt.is_nan() || mt < 1.0 {
+            return Err(OptimumError::Mt { value: mt });
+        }
+        if ju.is_nan() || ju <= 0.0 {
+            return Err(OptimumError::Ju { value: ju });
+        }
+        let none = ms.is_infinite() && mt.is_infinite() && ju.is_infinite();
+        if none { Err(OptimumError::NoLimit) } else { Ok(self) }
+    }
 
     /// Limits of Kristiansson and Lennartson's GMs = max(Ms, α Mt) ≤ C1 with α = C1/Mt's own limit, and Ju ≤ C2.
     #[must_use]

@@ -57,19 +57,7 @@ fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, Optimum
 }
 
 fn validate(problem: &OptimumProblem<'_>) -> Result<(), OptimumError> {
-    let LoopLimits { ms, mt, ju } = problem.limits;
-    if ms.is_nan() || ms <= 1.0 {
-        return Err(OptimumError::Ms { value: ms });
-    }
-    if mt.is_nan() || mt < 1.0 {
-        return Err(OptimumError::Mt { value: mt });
-    }
-    if ju.is_nan() || ju <= 0.0 {
-        return Err(OptimumError::Ju { value: ju });
-    }
-    if ms.is_infinite() && mt.is_infinite() && ju.is_infinite() {
-        return Err(OptimumError::NoLimit);
-    }
+    problem.limits.validated()?;
     if let Wanted::Pid(DerivativeFilter::Ratio(n)) = problem.wanted
         && !(n > 0.0 && n.is_finite())
     {

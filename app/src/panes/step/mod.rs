@@ -1,12 +1,17 @@
-//! Time responses of the loop: a setpoint step and a load step, of y and of u.
+//! Time responses of the loop: a setpoint step and a load step, of y and of u, on the model with what its uncertainty
+//! makes of them, and on the non-linear rig.
+
+mod on_rig;
 
 use eframe::egui::{self, RichText};
-use egui_plot::{Line, Plot, PlotPoints};
+use egui_plot::{Line, Plot, PlotPoints, Polygon};
 use vasos_engine::analyze::{Excitation, Response, ResponseOptions, step_response};
-use vasos_engine::control::PidGains;
+use vasos_engine::control::{ParallelGains, PidGains};
 use vasos_engine::model::ProcessModel;
+use vasos_engine::tune::TuningSpread;
 
 use crate::action::Action;
+use crate::answers::{Question, Reply};
 use crate::panes::View;
 use crate::panes::tune::row_in_view;
 use crate::tuning::{PRESENT, Row};
@@ -17,6 +22,9 @@ use crate::{plots, text, theme, tr};
 #[derive(Default)]
 pub struct State {
     load: bool,
+    rig: bool,
+    /// The band last shown, until the next is worked out.
+    band: Option<std::sync::Arc<Reply>>,
     cached: Vec<Cached>,
 }
 
@@ -67,10 +75,20 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     };
     ui.horizontal_wrapped(|ui| {
         let kinds = [tr!("step.setpoint"), tr!("step.load")];
-        if let Some(kind) = segmented(ui, &tr!("step.kind"), &kinds, usize::from(state.load)) {
+        let places = [tr!("step.model"), tr!("step.rig")];
+        if let Some(place) = segmented(ui, &tr!("step.place"), &places, usize::from(state.rig)) {
+            state.rig = place == 1;
+        }
+        // The rig gets both, one after the other.
+        if !state.rig
+            && let Some(kind) = segmented(ui, &tr!("step.kind"), &kinds, usize::from(state.load))
+        {
             state.load = kind == 1;
         }
     });
+    if state.rig {
+        return on_rig::ui(ui, view, row);
+    }
     let first = state.response(model, &row.gains, None);
     let settling = first.metrics().ok().and_then(|m| m.settling_time_s);
     let horizon_s = settling.filter(|s| *s > 0.0).map(|s| 1.8 * s);
@@ -78,23 +96,72 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let shown_s = response.time_s.last().copied();
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
     let ghost = present.map(|r| state.response(model, &r.gains, shown_s));
-    let height = ui.available_height() - 36.0;
+    let (band, actions) = band(view, state, model, row, shown_s);
+    let height = ui.available_height() - if band.is_some() { 52.0 } else { 36.0 };
     let units = view
         .document
         .model()
         .map_or((String::new(), String::new()), |e| (e.pv_unit.clone(), e.mv_unit.clone()));
-    curves(ui, true, 0.58 * height, &response, ghost.as_deref(), &units, state.load);
-    curves(ui, false, 0.42 * height, &response, ghost.as_deref(), &units, state.load);
+    let drawn = Drawn { response: &response, ghost: ghost.as_deref(), band: band.as_ref() };
+    curves(ui, true, 0.58 * height, &drawn, &units, state.load);
+    curves(ui, false, 0.42 * height, &drawn, &units, state.load);
     figures(ui, row, &first, state.load, &units);
-    vec![]
+    if let Some(band) = &band {
+        let p = theme::palette(ui);
+        let words = tr!(
+            "step.spread",
+            models = band.models,
+            unstable = text::fixed(100.0 * band.unstable_share(), 1),
+            low = text::brief(band.ms.low),
+            high = text::brief(band.ms.high)
+        );
+        let colour = if band.unstable > 0 { p.caution } else { p.weak };
+        ui.add(egui::Label::new(RichText::new(words).size(theme::SMALL).color(colour)).wrap());
+    }
+    actions
+}
+
+/// Curves of one plot.
+struct Drawn<'a> {
+    response: &'a Response,
+    ghost: Option<&'a Response>,
+    band: Option<&'a TuningSpread>,
+}
+
+/// What the uncertainty of the model's fit makes of the tuning in view, asked for where it is not known.
+fn band(
+    view: &View,
+    state: &mut State,
+    model: &ProcessModel,
+    row: &Row,
+    horizon_s: Option<f64>,
+) -> (Option<TuningSpread>, Vec<Action>) {
+    let fit = view.document.model().and_then(|entry| entry.fit.clone()).filter(|fit| fit.model == *model);
+    let (Some(fit), Some(horizon_s)) = (fit, horizon_s) else {
+        state.band = None;
+        return (None, vec![]);
+    };
+    let g = &row.gains;
+    let gains = ParallelGains { kp: g.kc, ki: g.ki(), kd: g.kd(), tf_s: g.td_s / g.n };
+    let excitation = if state.load { Excitation::Load } else { Excitation::Setpoint };
+    let question = Question::Spread { fit, gains, excitation, horizon_s };
+    let mut actions = vec![];
+    match view.answers.find(&question) {
+        Some(reply) => state.band = Some(reply),
+        None => actions.push(Action::Ask(Box::new(question))),
+    }
+    let band = match state.band.as_deref() {
+        Some(Reply::Spread(band)) => band.clone(),
+        _ => None,
+    };
+    (band, actions)
 }
 
 fn curves(
     ui: &mut egui::Ui,
     is_pv: bool,
     height: f32,
-    response: &Response,
-    ghost: Option<&Response>,
+    drawn: &Drawn<'_>,
     (pv_unit, mv_unit): &(String, String),
     load: bool,
 ) {
@@ -120,12 +187,28 @@ fn curves(
     plot = plot.custom_x_axes(vec![plots::x_axis(time_label)]);
     let names = (tr!("step.in_view"), tr!("rules.present"));
     plot.show(ui, |plot| {
-        if let Some(ghost) = ghost {
+        let colour = if is_pv { p.pv } else { p.mv };
+        if let Some(band) = drawn.band {
+            let values = if is_pv { &band.pv } else { &band.mv };
+            plot.polygon(fan(&band.time_s, values).fill_color(colour.gamma_multiply(0.16)));
+        }
+        if let Some(ghost) = drawn.ghost {
             plot.line(Line::new(names.1, points(ghost)).color(p.ghost).width(1.2));
         }
-        let colour = if is_pv { p.pv } else { p.mv };
-        plot.line(Line::new(names.0, points(response)).color(colour).width(theme::LINE));
+        plot.line(Line::new(names.0, points(drawn.response)).color(colour).width(theme::LINE));
     });
+}
+
+/// From the lower edge of a band along and back along the upper one, as far as both are finite.
+fn fan(time_s: &[f64], band: &[[f64; 3]]) -> Polygon<'static> {
+    /// A loop that runs away would leave nothing else to be seen.
+    const FARTHEST: f64 = 20.0;
+    let known = time_s.iter().zip(band).take_while(|(_, b)| b.iter().all(|v| v.abs() < FARTHEST));
+    let known: Vec<(f64, [f64; 3])> = known.map(|(t, b)| (*t, *b)).collect();
+    let lower = known.iter().map(|(t, b)| [*t, b[0]]);
+    let upper = known.iter().rev().map(|(t, b)| [*t, b[2]]);
+    let outline: Vec<[f64; 2]> = lower.chain(upper).collect();
+    Polygon::new(tr!("step.band"), PlotPoints::from(outline)).stroke(egui::Stroke::NONE).allow_hover(false)
 }
 
 fn figures(ui: &mut egui::Ui, row: &Row, response: &Response, load: bool, units: &(String, String)) {

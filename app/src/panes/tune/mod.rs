@@ -1,4 +1,7 @@
-//! Rules compared on the model in use; one is looked at, and applied to the loop with one action.
+//! Rules and the best gains compared on the model in use; one is looked at, and applied to the loop with one action.
+
+mod limits;
+mod map;
 
 use eframe::egui::{self, RichText};
 use egui_extras::{Column, TableBuilder};
@@ -8,7 +11,7 @@ use vasos_engine::tune::{ControllerKind, find_rule};
 
 use crate::action::Action;
 use crate::panes::View;
-use crate::tuning::{PRESENT, Refusal, Row, same_units};
+use crate::tuning::{OPTIMAL, PRESENT, Refusal, Refused, Row, same_units};
 use crate::widgets::segmented;
 use crate::{i18n, text, theme, tr};
 
@@ -32,6 +35,8 @@ enum Form {
 pub struct State {
     kind: usize,
     form: Form,
+    map: bool,
+    on_map: map::State,
 }
 
 /// The row in view: the candidate, else the tuning in use.
@@ -51,6 +56,14 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         return actions;
     }
     ui.horizontal_wrapped(|ui| {
+        let views = [tr!("tune.table"), tr!("tune.map")];
+        if let Some(chosen) = segmented(ui, &tr!("tune.view"), &views, usize::from(state.map)) {
+            state.map = chosen == 1;
+        }
+        if state.map {
+            map::head(ui, &mut state.on_map);
+            return;
+        }
         let kinds = [tr!("tune.all"), "PI".to_owned(), "PID".to_owned(), "P, PD".to_owned()];
         if let Some(kind) = segmented(ui, &tr!("tune.controller"), &kinds, state.kind) {
             state.kind = kind;
@@ -62,8 +75,14 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             state.form = if form == 1 { Form::Parallel } else { Form::Ideal };
         }
     });
+    limits::ui(ui, view, &mut actions);
     let below = 58.0;
     let height = (ui.available_height() - below).max(60.0);
+    if state.map {
+        map::ui(ui, view, &mut state.on_map, height, &mut actions);
+        details(ui, view, &mut actions);
+        return actions;
+    }
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
         ui.set_min_width(88.0 + 9.0 * (COLUMN + 3.0) + 14.0);
         ui.spacing_mut().item_spacing = egui::vec2(3.0, 0.0);
@@ -84,7 +103,7 @@ fn shown(state: &State, kind: ControllerKind) -> bool {
 
 /// A rule that gives nothing for this model, with its reason under the pointer.
 fn refusal(line: &mut egui_extras::TableRow<'_, '_>, refusal: &Refusal, ink: egui::Color32) {
-    let why = i18n::say(&refusal.error);
+    let why = refusal.why.say();
     line.col(|ui| {
         let words = format!("{} · {}", tr!(refusal.title_key), refusal.kind);
         ui.add(egui::Label::new(RichText::new(words).size(theme::TABLE).color(ink)).truncate())
@@ -92,7 +111,8 @@ fn refusal(line: &mut egui_extras::TableRow<'_, '_>, refusal: &Refusal, ink: egu
     });
     for _ in 0..9 {
         line.col(|ui| {
-            ui.label(RichText::new("–").size(theme::TABLE).color(ink)).on_hover_text(&why);
+            let mark = if matches!(refusal.why, Refused::Pending) { "…" } else { "–" };
+            ui.label(RichText::new(mark).size(theme::TABLE).color(ink)).on_hover_text(&why);
         });
     }
 }
@@ -103,6 +123,10 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let rows: Vec<&Row> =
         view.tuning.rows.iter().filter(|r| shown(state, r.kind) || r.rule == PRESENT).collect();
     let refusals: Vec<&Refusal> = view.tuning.refusals.iter().filter(|r| shown(state, r.kind)).collect();
+    // Best gains that cannot be had stand where they would stand.
+    let (first, last): (Vec<&Refusal>, Vec<&Refusal>) =
+        refusals.into_iter().partition(|r| r.title_key == "rules.optimal");
+    let lead = rows.iter().take_while(|r| r.rule == PRESENT || r.rule == OPTIMAL).count();
     let entry = view.document.model();
     let (pv, mv) = entry.map_or(("", ""), |e| (e.pv_unit.as_str(), e.mv_unit.as_str()));
     // A long unit has no room above a narrow column; the pointer over the title shows it whole.
@@ -148,26 +172,33 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
             }
         })
         .body(|body| {
-            body.rows(ROW, rows.len() + refusals.len(), |mut line| {
+            body.rows(ROW, rows.len() + first.len() + last.len(), |mut line| {
                 let index = line.index();
+                if index >= lead && index < lead + first.len() {
+                    refusal(&mut line, first[index - lead], p.weak);
+                    return;
+                }
+                let index = if index < lead { index } else { index - first.len() };
                 let Some(row) = rows.get(index) else {
-                    refusal(&mut line, refusals[index - rows.len()], p.weak);
+                    refusal(&mut line, last[index - rows.len()], p.weak);
                     return;
                 };
                 let selected = chosen == Some((row.rule, row.kind));
                 line.set_selected(selected);
                 cells(&mut line, row, state, if selected { p.on_accent } else { p.text });
                 if line.response().clicked() {
-                    let candidate = Candidate {
-                        rule: row.rule.to_owned(),
-                        controller: row.kind.id().to_owned(),
-                        gains: row.gains,
-                    };
-                    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate))));
-                    actions.push(Action::Seal);
+                    choose(row, actions);
                 }
             });
         });
+}
+
+/// Makes a row the one in view.
+fn choose(row: &Row, actions: &mut Vec<Action>) {
+    let candidate =
+        Candidate { rule: row.rule.to_owned(), controller: row.kind.id().to_owned(), gains: row.gains };
+    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    actions.push(Action::Seal);
 }
 
 fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink: egui::Color32) {
@@ -215,7 +246,7 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     let other_units = view.document.model().filter(|m| !same_units(view.document, m, view.focus));
     let units = other_units.map(|m| tr!("tune.other_units", unit = text::quotient(&m.mv_unit, &m.pv_unit)));
     let words = units.iter().cloned().chain(row.warnings.iter().map(|w| i18n::say(w)));
-    let words = words.collect::<Vec<_>>().join(" · ");
+    let words = proof(row).into_iter().chain(words).collect::<Vec<_>>().join(" · ");
     let words = if row.analysis.stable { words } else { tr!("tune.unstable_hint") };
     let flagged = units.is_some() || !row.analysis.stable || row.warnings.iter().any(|w| w.limits_validity());
     let source = match (words.is_empty(), flagged) {
@@ -267,11 +298,22 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     });
 }
 
+/// What holds the best gains where they are.
+fn proof(row: &Row) -> Option<String> {
+    let certificate = row.certificate.as_ref()?;
+    let active: Vec<String> = certificate.active.iter().map(ToString::to_string).collect();
+    let held = if active.is_empty() { "–".to_owned() } else { active.join(", ") };
+    Some(match certificate.gap {
+        Some(gap) => tr!("tune.proof", limits = held, gap = text::brief(100.0 * gap.max(1e-7))),
+        None => tr!("tune.proof_simulated", limits = held),
+    })
+}
+
 /// The PV filter that a row brings along, in seconds, where it is not the one in use.
 ///
 /// Unfiltered derivative action keeps the pump at its limits with a rig's noise: with the paper's AMIGO tuning of
 /// STAD a filter of about Td (1 s) ends that.
-fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
+pub(super) fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
     let now_s = view.document.rig.loops.get(tag).map_or(0.0, |s| s.pv_filter_s);
     (row.gains.td_s > 0.0 && now_s == 0.0).then_some(row.gains.td_s)
 }

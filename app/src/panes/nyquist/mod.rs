@@ -1,11 +1,16 @@
-//! The Nyquist curve of the loop with its Ms and Mt circles, the critical point and the margins.
+//! The loop over frequency: Nyquist curve with its circles and margins, Bode, Nichols, gang of four, poles and zeros.
+
+mod over_frequency;
+mod pole_map;
 
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, Points, Polygon, Text};
 use num_complex::Complex64;
 use vasos_engine::analyze::{CurveOptions, LoopFunction, OpenLoop, frequency_curve};
 use vasos_engine::control::PidGains;
+use vasos_engine::document::{DocumentCommand, OptimumSettings};
 use vasos_engine::model::ProcessModel;
+use vasos_engine::tune::optimum::LoopLimits;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -20,7 +25,15 @@ const FARTHEST: f64 = 60.0;
 #[derive(Default)]
 pub struct State {
     cached: Vec<(ProcessModel, PidGains, Vec<[f64; 3]>)>,
+    shown: usize,
+    curves: over_frequency::State,
+    /// The limit on Ms is being dragged.
+    dragging: bool,
 }
+
+/// What the pane can show.
+const VIEWS: [&str; 5] =
+    ["nyquist.curve", "nyquist.bode", "nyquist.nichols", "nyquist.gang_of_four", "nyquist.poles"];
 
 impl State {
     /// (Re L, Im L, ω) along the curve.
@@ -49,16 +62,42 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         return vec![];
     };
     let p = theme::palette(ui);
-    figures(ui, row);
+    ui.horizontal_wrapped(|ui| {
+        egui::ComboBox::from_id_salt("nyquist_view")
+            .selected_text(tr!(VIEWS[state.shown]))
+            .width(92.0)
+            .show_ui(ui, |ui| {
+                for (i, key) in VIEWS.iter().enumerate() {
+                    ui.selectable_value(&mut state.shown, i, tr!(key));
+                }
+            });
+        figures(ui, row);
+    });
+    let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
+    match state.shown {
+        1..=3 => {
+            let tunings = over_frequency::Tunings { model, row, present };
+            over_frequency::ui(ui, state.shown, &tunings, &mut state.curves);
+            return vec![];
+        }
+        4 => {
+            pole_map::ui(ui, model, row);
+            return vec![];
+        }
+        _ => {}
+    }
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
     let curve = state.curve(model, &row.gains);
     let ghost = present.map(|r| state.curve(model, &r.gains));
     let names = [tr!("nyquist.loop"), tr!("rules.present")];
     let hover = curve.clone();
     let ellipses = uncertainty(view, model, &row.gains, &curve);
-    Plot::new("nyquist")
+    let limit = view.document.optimum.limits.ms;
+    let dragging = state.dragging;
+    let response = Plot::new("nyquist")
         .data_aspect(1.0)
         .allow_scroll(false)
+        .allow_drag(!dragging)
         .include_x(-2.4)
         .include_x(0.8)
         .include_y(-2.2)
@@ -88,6 +127,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         })
         .show(ui, |plot| {
             circles(plot, row, &p);
+            limit_circle(plot, limit, &p);
             if let Some(ghost) = ghost {
                 plot.line(Line::new(names[1].clone(), plane(&ghost)).color(p.ghost).width(1.2));
             }
@@ -104,7 +144,57 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             let label = RichText::new("−1").color(p.text).size(theme::BODY);
             plot.text(Text::new("", PlotPoint::new(-1.0, 0.16), label));
         });
-    vec![]
+    drag_limit(ui, view, state, &response)
+}
+
+/// The limit on Ms of the best gains as a circle about −1.
+fn limit_circle(plot: &mut egui_plot::PlotUi<'_>, limit: f64, p: &theme::Palette) {
+    if !limit.is_finite() {
+        return;
+    }
+    let name = tr!("nyquist.limit", ms = text::brief(limit));
+    plot.line(Line::new(name, circle(-1.0, 1.0 / limit)).color(p.caution).width(1.2));
+}
+
+/// The circle of the limit follows the pointer; the best gains follow the limit.
+fn drag_limit(
+    ui: &egui::Ui,
+    view: &View,
+    state: &mut State,
+    shown: &egui_plot::PlotResponse<()>,
+) -> Vec<Action> {
+    /// How near to the circle a drag must begin, in points of the screen.
+    const REACH: f64 = 9.0;
+    const RANGE: (f64, f64) = (1.02, 4.0);
+    let settings = view.document.optimum;
+    let radius_at = |pointer: egui::Pos2| {
+        let at = shown.transform.value_from_position(pointer);
+        (at.x + 1.0).hypot(at.y)
+    };
+    let Some(pointer) = shown.response.interact_pointer_pos().or(shown.response.hover_pos()) else {
+        state.dragging = false;
+        return vec![];
+    };
+    let scale = shown.transform.dpos_dvalue_x().abs();
+    let near = (radius_at(pointer) - 1.0 / settings.limits.ms).abs() * scale < REACH;
+    let pressed = ui.input(|i| i.pointer.primary_down());
+    if !pressed {
+        let ended = std::mem::replace(&mut state.dragging, false);
+        if near {
+            ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);
+        }
+        return if ended { vec![Action::Seal] } else { vec![] };
+    }
+    if near && ui.input(|i| i.pointer.primary_pressed()) {
+        state.dragging = true;
+    }
+    if !state.dragging {
+        return vec![];
+    }
+    ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
+    let ms = (1.0 / radius_at(pointer)).clamp(RANGE.0, RANGE.1);
+    let limits = LoopLimits { ms, ..settings.limits };
+    vec![Action::Document(DocumentCommand::Optimum(OptimumSettings { limits, ..settings }))]
 }
 
 /// 95 % ellipses of the fitted process along the loop's curve, where they can be seen.
@@ -143,7 +233,7 @@ fn plane(curve: &[[f64; 3]]) -> PlotPoints<'static> {
 fn figures(ui: &mut egui::Ui, row: &Row) {
     let a = &row.analysis;
     let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
-    ui.horizontal_wrapped(|ui| {
+    {
         ui.label(RichText::new(format!("{title} · {}", row.kind)).family(theme::bold()));
         let p = theme::palette(ui);
         let words = if a.stable {
@@ -159,21 +249,22 @@ fn figures(ui: &mut egui::Ui, row: &Row) {
             tr!("tune.unstable_hint")
         };
         ui.label(RichText::new(words).size(theme::SMALL).color(if a.stable { p.weak } else { p.caution }));
-    });
+    }
+}
+
+fn circle(x: f64, r: f64) -> PlotPoints<'static> {
+    (0..=128)
+        .map(|i| {
+            let a = std::f64::consts::TAU * f64::from(i) / 128.0;
+            [x + r * a.cos(), r * a.sin()]
+        })
+        .collect::<Vec<_>>()
+        .into()
 }
 
 /// |S| = Ms is the circle of radius 1/Ms about −1; |T| = Mt the one about −Mt²/(Mt² − 1) of radius Mt/(Mt² − 1),
 /// for Mt = 1 the line Re L = −½.
 fn circles(plot: &mut egui_plot::PlotUi<'_>, row: &Row, p: &theme::Palette) {
-    let circle = |x: f64, r: f64| -> PlotPoints<'static> {
-        (0..=128)
-            .map(|i| {
-                let a = std::f64::consts::TAU * f64::from(i) / 128.0;
-                [x + r * a.cos(), r * a.sin()]
-            })
-            .collect::<Vec<_>>()
-            .into()
-    };
     let unit =
         Line::new("|L| = 1", circle(0.0, 1.0)).color(p.grid).width(1.0).style(LineStyle::dotted_dense());
     plot.line(unit);

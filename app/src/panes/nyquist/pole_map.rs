@@ -1,0 +1,62 @@
+//! Poles and zeros of the rational part of the loop.
+
+use eframe::egui::{self, RichText};
+use egui_plot::{MarkerShape, Plot, Points, VLine};
+use num_complex::Complex64;
+use vasos_engine::analyze::OpenLoop;
+use vasos_engine::model::ProcessModel;
+
+use crate::tuning::Row;
+use crate::{plots, text, theme, tr};
+
+/// Draws the map.
+pub(super) fn ui(ui: &mut egui::Ui, model: &ProcessModel, row: &Row) {
+    let open = OpenLoop::new(model, &row.gains);
+    let p = theme::palette(ui);
+    let dead_time_s = model.dead_time_s();
+    if dead_time_s > 0.0 {
+        let words = tr!("nyquist.poles_note", dead_time = text::brief(dead_time_s));
+        ui.add(egui::Label::new(RichText::new(words).size(theme::SMALL).color(p.weak)).wrap());
+    }
+    let on_plane = |roots: &[Complex64]| roots.iter().map(|r| [r.re, r.im]).collect::<Vec<_>>();
+    let named: Vec<([f64; 2], String)> = open
+        .poles()
+        .iter()
+        .map(|r| (r, tr!("nyquist.pole")))
+        .chain(open.zeros().iter().map(|r| (r, tr!("nyquist.zero"))))
+        .map(|(r, name)| {
+            let im = if r.im == 0.0 { String::new() } else { format!(" ± j {}", text::brief(r.im.abs())) };
+            ([r.re, r.im], format!("{name} {}{im} rad/s", text::brief(r.re)))
+        })
+        .collect();
+    let reach = named.iter().map(|n| n.0[0].hypot(n.0[1])).fold(1e-6, f64::max);
+    Plot::new("poles")
+        .height(ui.available_height() - 4.0)
+        .allow_scroll(false)
+        .data_aspect(1.0)
+        .include_x(-1.15 * reach)
+        .include_x(0.4 * reach)
+        .include_y(-0.6 * reach)
+        .include_y(0.6 * reach)
+        .custom_x_axes(vec![plots::x_axis("Re s [rad/s]")])
+        .custom_y_axes(vec![plots::y_axis("Im s [rad/s]")])
+        .x_grid_spacer(plots::x_marks)
+        .y_grid_spacer(plots::y_marks)
+        .grid_color(p.grid)
+        .label_formatter(move |position| {
+            let at = match position {
+                egui_plot::HoverPosition::NearDataPoint { position, .. }
+                | egui_plot::HoverPosition::Elsewhere { position } => *position,
+            };
+            let away = |q: &[f64; 2]| (q[0] - at.x).hypot(q[1] - at.y);
+            let nearest = named.iter().min_by(|a, b| away(&a.0).total_cmp(&away(&b.0)))?;
+            (away(&nearest.0) < 0.05 * reach).then(|| nearest.1.clone())
+        })
+        .show(ui, |plot| {
+            plot.vline(VLine::new("", 0.0).color(p.weak).width(1.0));
+            let poles = Points::new(tr!("nyquist.pole"), on_plane(open.poles()));
+            plot.points(poles.shape(MarkerShape::Cross).radius(6.0).color(p.pv));
+            let zeros = Points::new(tr!("nyquist.zero"), on_plane(open.zeros()));
+            plot.points(zeros.shape(MarkerShape::Circle).filled(false).radius(5.0).color(p.sp));
+        });
+}
