@@ -14,7 +14,7 @@ use crate::{i18n, plots, text, theme, tr};
 
 /// Step of the setpoint in cm, and what the pump keeps of its flow as a load.
 const STEP_CM: f64 = 1.0;
-const PUMP_SHARE: f64 = 0.9;
+const PUMP_SHARE: f64 = 0.95;
 /// Length in units of the model's time constants, and its bounds in seconds.
 const LENGTH: f64 = 12.0;
 const LENGTHS_S: (f64, f64) = (300.0, 7200.0);

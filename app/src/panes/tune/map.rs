@@ -1,7 +1,7 @@
 //! The trade-off map: what is possible, and where every rule and the tuning in use stand against it.
 
 use eframe::egui::{self, RichText};
-use egui_plot::{Line, Plot, PlotPoint, Points, Text};
+use egui_plot::{Line, Plot, PlotBounds, PlotPoint, Points, Text};
 use vasos_engine::tune::ControllerKind;
 use vasos_engine::tune::optimum::{LoopLimits, TradeOff};
 
@@ -17,8 +17,11 @@ use crate::{plots, text, theme, tr};
 const LARGEST_MS: f64 = 3.2;
 /// How near a click must be to a point, in points of the screen.
 const REACH: f32 = 14.0;
-/// How far labels keep from each other, in points of the screen.
-const LABEL: egui::Vec2 = egui::vec2(70.0, 12.0);
+/// Size of a letter of a label, about, in points of the screen.
+const LETTER: egui::Vec2 = egui::vec2(6.1, 13.0);
+/// Room about what is shown: in Ms, and in decades.
+const ROOM_MS: f64 = 0.08;
+const ROOM_DECADES: f64 = 0.25;
 
 /// State of the map.
 #[derive(Default)]
@@ -71,9 +74,17 @@ pub(super) fn ui(ui: &mut egui::Ui, view: &View, state: &mut State, height: f32,
         .grid_color(p.grid)
         .label_formatter(|_| None)
         .show(ui, |plot| {
+            if plot.auto_bounds().any() {
+                plot.set_plot_bounds(bounds(&fronts, &spots, by_ju));
+            }
             for (kind, points) in &fronts {
                 let name = tr!("tune.front", controller = kind.to_string());
                 let colour = if *kind == ControllerKind::Pi { p.pv } else { p.sp };
+                if let Some(last) = points.last() {
+                    let label = RichText::new(name.clone()).size(theme::SMALL).color(colour);
+                    let at = PlotPoint::new(last[0], last[1]);
+                    plot.text(Text::new("", at, label).anchor(egui::Align2::RIGHT_TOP));
+                }
                 plot.line(Line::new(name, points.clone()).color(colour).width(theme::LINE));
             }
             for spot in &spots {
@@ -96,6 +107,20 @@ pub(super) fn ui(ui: &mut egui::Ui, view: &View, state: &mut State, height: f32,
             choose(row, actions);
         }
     }
+}
+
+/// Everything that is shown, with room for the names about it.
+fn bounds(fronts: &[(ControllerKind, Vec<[f64; 2]>)], spots: &[Spot<'_>], by_ju: bool) -> PlotBounds {
+    let all = fronts.iter().flat_map(|f| f.1.iter().copied()).chain(spots.iter().map(|s| s.at));
+    let start = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    let (low, high) = all.fold(start, |(low, high), q| {
+        ([low[0].min(q[0]), low[1].min(q[1])], [high[0].max(q[0]), high[1].max(q[1])])
+    });
+    if low[0] > high[0] {
+        return PlotBounds::from_min_max([1.0, -1.0], [3.0, 1.0]);
+    }
+    let room = if by_ju { ROOM_DECADES } else { ROOM_MS };
+    PlotBounds::from_min_max([low[0] - room, low[1] - ROOM_DECADES], [high[0] + room, high[1] + ROOM_DECADES])
 }
 
 fn with_unit(name: &str, unit: String) -> String {
@@ -193,17 +218,27 @@ fn labels(
     };
     order.sort_by_key(|s| rank(s));
     let mut taken: Vec<egui::Rect> = Vec::new();
+    let frame = plot.response().rect;
     for spot in order {
         let at = plot.screen_from_plot(PlotPoint::new(spot.at[0], spot.at[1]));
-        let rect = egui::Rect::from_min_size(at + egui::vec2(7.0, -LABEL.y), LABEL);
-        if taken.iter().any(|other| other.intersects(rect)) {
+        let words = title(spot.row);
+        let size = egui::vec2(LETTER.x * words.chars().count() as f32, LETTER.y);
+        // To the right of the point, or to its left where the plot ends.
+        let right = at.x + size.x + 8.0 < frame.right();
+        let corner = at + egui::vec2(if right { 7.0 } else { -7.0 - size.x }, -size.y - 1.0);
+        let rect = egui::Rect::from_min_size(corner, size);
+        if !frame.contains_rect(rect) || taken.iter().any(|other| other.intersects(rect)) {
             continue;
         }
         taken.push(rect);
         let ink = if rank(spot) < 3 { p.text } else { p.weak };
-        let label = RichText::new(title(spot.row)).size(theme::SMALL).color(ink);
-        let corner = plot.plot_from_screen(at + egui::vec2(7.0, -2.0));
-        plot.text(Text::new("", corner, label).anchor(egui::Align2::LEFT_BOTTOM));
+        let label = RichText::new(words).size(theme::SMALL).color(ink);
+        let (anchor, from) = if right {
+            (egui::Align2::LEFT_BOTTOM, rect.left_bottom())
+        } else {
+            (egui::Align2::RIGHT_BOTTOM, egui::pos2(at.x - 7.0, rect.bottom()))
+        };
+        plot.text(Text::new("", plot.plot_from_screen(from), label).anchor(anchor));
     }
 }
 
