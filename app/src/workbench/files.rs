@@ -7,7 +7,7 @@ use eframe::egui;
 use vasos_engine::document::{DocumentCommand, LogRoles};
 use vasos_engine::experiment::ExperimentEnd;
 use vasos_io::experiment::load_experiment;
-use vasos_io::log::{ImportOptions, ImportedLog, import_log};
+use vasos_io::log::{ImportError, ImportOptions, ImportedLog, open_log};
 use vasos_io::rig::{FileError, load_rig};
 
 use super::Workbench;
@@ -65,15 +65,9 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
         let reason = tr!("window.is_folder");
         return Outcome::Failed(Box::new(FileError::Read { path: shown, reason }));
     }
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            return Outcome::Failed(Box::new(FileError::Read { path: shown, reason: error.to_string() }));
-        }
-    };
-    let name = path.file_name().map_or(shown, |n| n.to_string_lossy().into_owned());
-    match import_log(&name, &bytes, options) {
+    match open_log(path, options) {
         Ok(log) => Outcome::Log(path.to_owned(), Box::new(log)),
+        Err(ImportError::Read { reason }) => Outcome::Failed(Box::new(FileError::Read { path: shown, reason })),
         Err(error) => Outcome::Failed(Box::new(error)),
     }
 }

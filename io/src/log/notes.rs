@@ -44,7 +44,7 @@ fn frozen(column: &LogColumn, table: &LogTable) -> Option<Repair> {
     let elsewhere = values.len() - longest;
     let moves = elsewhere > longest && changes as f64 >= MOVES * elsewhere as f64;
     // An output at its limit rests, but is not frozen.
-    let at_limit = || values.iter().all(|v| !(*v < values[at])) || values.iter().all(|v| !(*v > values[at]));
+    let at_limit = || !values.iter().any(|v| *v < values[at]) || !values.iter().any(|v| *v > values[at]);
     (longest >= allowed && moves && !at_limit()).then(|| Repair::Frozen {
         column: column.name.clone(),
         line: table.lines.get(at).map_or(0, |l| *l as usize),
@@ -65,7 +65,7 @@ fn oversampled(column: &LogColumn, table: &LogTable) -> Option<Repair> {
         return None;
     }
     let (rhythm, &often) = counts.iter().enumerate().max_by_key(|(_, n)| **n)?;
-    if rhythm < 2 || rhythm >= LONGEST_RHYTHM || (often as f64) < EVERY_TIME * changes as f64 {
+    if !(2..LONGEST_RHYTHM).contains(&rhythm) || (often as f64) < EVERY_TIME * changes as f64 {
         return None;
     }
     let kept = runs(&column.values).skip(1).filter(|length| length.is_multiple_of(rhythm)).count();

@@ -33,7 +33,7 @@ pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, 
         repairs.push(Repair::OtherRuns { run: run.to_owned(), others: runs.len() - 1 });
     }
     let mut series: Vec<Series> =
-        all.iter().filter(|c| c.recording == run).filter(numeric).flat_map(|c| signals(c)).collect();
+        all.iter().filter(|c| c.recording == run).filter(numeric).flat_map(signals).collect();
     let merged = merge(&mut series, repairs);
     let unit = Some("s".to_owned());
     let mut columns = vec![ReadColumn::new("time".to_owned(), unit, Kind::Number, merged.time_s)];

@@ -133,7 +133,7 @@ fn midnight(y: i64, m: i64, d: i64) -> Option<f64> {
     let days = days_from_civil(y, m, d);
     // The 31st of a month of thirty days would come out as the first of the next.
     let there = sane && (d <= 28 || super::calendar::civil(days) == (y, m, d));
-    there.then(|| days as f64 * DAY_S)
+    there.then_some(days as f64 * DAY_S)
 }
 
 /// `2024-06-28-14:35:00` and `2024/06/28-14:35:00`.
