@@ -28,7 +28,11 @@ fn write(path: &std::path::Path, bytes: u64) -> usize {
     let names: Vec<String> = (0..COLUMNS).map(|i| format!("TIC{i}.PV")).collect();
     written += out.write(format!("time;{}\n", names.join(";")).as_bytes()).expect("room") as u64;
     let tails: Vec<String> = (0..997)
-        .map(|k| (0..COLUMNS).map(|i| format!(";{}.{:06}", 100 + (k * 31 + i * 17) % 800, k * 1009 % 1_000_000)).collect())
+        .map(|k| {
+            (0..COLUMNS)
+                .map(|i| format!(";{}.{:06}", 100 + (k * 31 + i * 17) % 800, k * 1009 % 1_000_000))
+                .collect()
+        })
         .collect();
     let mut rows = 0;
     while written < bytes {

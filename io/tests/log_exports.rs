@@ -48,7 +48,10 @@ fn wincc_archive() {
     for k in 0..30 {
         for (tag, value) in [("LIC101_PV", pv(k)), ("LIC101_SP", 50.0), ("LIC101_MV", mv(k))] {
             let (validity, value) = if k == 7 && tag.ends_with("PV") { (0, 0.0) } else { (1, value) };
-            text += &format!("\"{tag}\";\"28.06.2024 14:35:{k:02}\";{};{validity};45471607638,8889\r\n", format!("{value:.4}").replace('.', ","));
+            text += &format!(
+                "\"{tag}\";\"28.06.2024 14:35:{k:02}\";{};{validity};45471607638,8889\r\n",
+                format!("{value:.4}").replace('.', ",")
+            );
         }
     }
     let log = import(&text);
@@ -111,7 +114,10 @@ fn signals_with_stamps_of_their_own() {
     assert_eq!(column(&log, "LIC101.OP")[1], column(&log, "LIC101.OP")[0], "held between");
     let r = &log.report.repairs;
     assert!(r.iter().any(|r| matches!(r, Repair::OwnTimes { .. })), "{r:?}");
-    assert!(r.iter().any(|r| matches!(r, Repair::HeldValues { column, .. } if column == "LIC101.OP")), "{r:?}");
+    assert!(
+        r.iter().any(|r| matches!(r, Repair::HeldValues { column, .. } if column == "LIC101.OP")),
+        "{r:?}"
+    );
 }
 
 #[test]
@@ -127,9 +133,18 @@ fn pi_datalink_sampled() {
 
 #[test]
 fn deltav_and_exaopc() {
-    let deltav = rows("Date/Time,FIC-101/PID1/PV.CV,FIC-101/PID1/SP.CV,FIC-101/PID1/OUT.CV,FIC-101/PID1/MODE.ACTUAL\n", 30, |k| {
-        format!("6/28/2024 2:35:{k:02} PM,{:.3},50,{:.3},{}", pv(k), mv(k), if k < 9 { "MAN" } else { "AUTO" })
-    });
+    let deltav = rows(
+        "Date/Time,FIC-101/PID1/PV.CV,FIC-101/PID1/SP.CV,FIC-101/PID1/OUT.CV,FIC-101/PID1/MODE.ACTUAL\n",
+        30,
+        |k| {
+            format!(
+                "6/28/2024 2:35:{k:02} PM,{:.3},50,{:.3},{}",
+                pv(k),
+                mv(k),
+                if k < 9 { "MAN" } else { "AUTO" }
+            )
+        },
+    );
     let log = import(&deltav);
     starts(&log, "2024-06-28T14:35:00");
     assert_eq!(
@@ -160,7 +175,11 @@ fn ignition_writes_changes_only() {
     let cv = column(&log, "Area/LIC_101/CV");
     assert_eq!(cv[4], cv[0]);
     assert!(
-        log.report.repairs.contains(&Repair::HeldValues { column: "Area/LIC_101/CV".into(), count: 48, longest_s: 4.0 }),
+        log.report.repairs.contains(&Repair::HeldValues {
+            column: "Area/LIC_101/CV".into(),
+            count: 48,
+            longest_s: 4.0
+        }),
         "{:?}",
         log.report.repairs
     );
@@ -201,14 +220,17 @@ fn arduino_serial_monitor() {
 
 #[test]
 fn pandas_and_r_and_matlab() {
-    let pandas = rows(",time,level,pump\n", 20, |k| format!("{k},{:.1},{:.17},{}", 0.5 * k as f64, pv(k), mv(k)));
+    let pandas =
+        rows(",time,level,pump\n", 20, |k| format!("{k},{:.1},{:.17},{}", 0.5 * k as f64, pv(k), mv(k)));
     let log = import(&pandas);
     assert_eq!(log.report.time_column.as_deref(), Some("time"));
     assert_eq!(column(&log, "pump")[5], mv(5));
-    let indexed = rows(",level,pump\n", 20, |k| format!("2024-06-28 14:35:{k:02}.500000+02:00,{},{}", pv(k), mv(k)));
+    let indexed =
+        rows(",level,pump\n", 20, |k| format!("2024-06-28 14:35:{k:02}.500000+02:00,{},{}", pv(k), mv(k)));
     let log = import(&indexed);
     starts(&log, "2024-06-28T14:35:00.500");
-    let r = rows("\"time\" \"level\" \"pump\"\n", 20, |k| format!("\"{}\" {} {} {}", k + 1, 2 * k, pv(k), mv(k)));
+    let r =
+        rows("\"time\" \"level\" \"pump\"\n", 20, |k| format!("\"{}\" {} {} {}", k + 1, 2 * k, pv(k), mv(k)));
     let log = import(&r);
     assert_eq!(log.report.time_column.as_deref(), Some("time"));
     let matlab = rows("", 20, |k| format!("{:.10},{},{}", 739_431.5 + k as f64 / 86_400.0, pv(k), mv(k)));
@@ -220,20 +242,33 @@ fn pandas_and_r_and_matlab() {
 #[test]
 fn spreadsheets_of_germany_and_brazil() {
     let german = rows("Zeit;Füllstand [cm];Sollwert [cm];Stellgröße [%]\r\n", 20, |k| {
-        format!("28.06.2024 14:35:{k:02};{};1.050,5;{}\r", format!("{:.3}", pv(k)).replace('.', ","), format!("{:.1}", mv(k)).replace('.', ","))
+        format!(
+            "28.06.2024 14:35:{k:02};{};1.050,5;{}\r",
+            format!("{:.3}", pv(k)).replace('.', ","),
+            format!("{:.1}", mv(k)).replace('.', ",")
+        )
     });
     let latin: Vec<u8> = german.chars().map(|c| c as u8).collect();
     let log = import_log("test", &latin, &ImportOptions::default()).expect("a log");
     assert_eq!(column(&log, "Sollwert")[0], 1050.5);
-    assert_eq!(log.report.text().map(|t| (t.separator, t.decimal)), Some((Separator::Semicolon, Decimal::Comma)));
+    assert_eq!(
+        log.report.text().map(|t| (t.separator, t.decimal)),
+        Some((Separator::Semicolon, Decimal::Comma))
+    );
     assert_eq!(roles(&log)[..3], [Some("Füllstand"), Some("Sollwert"), Some("Stellgröße")]);
     let brazilian = rows("Data;Hora;Nível (cm);Referência (cm);Vazão (L/min)\n", 20, |k| {
-        format!("28/06/2024;14:35:{k:02};{};50,0;{}", format!("{:.2}", pv(k)).replace('.', ","), format!("{:.2}", mv(k)).replace('.', ","))
+        format!(
+            "28/06/2024;14:35:{k:02};{};50,0;{}",
+            format!("{:.2}", pv(k)).replace('.', ","),
+            format!("{:.2}", mv(k)).replace('.', ",")
+        )
     });
     let log = import(&brazilian);
     assert_eq!(roles(&log)[..3], [Some("Nível"), Some("Referência"), Some("Vazão")]);
     starts(&log, "2024-06-28T14:35:00");
-    let serials = rows("Tempo;Nível\n", 20, |k| format!("{};{:.0}", format!("{:.9}", 45471.5 + k as f64 / 86_400.0).replace('.', ","), pv(k)));
+    let serials = rows("Tempo;Nível\n", 20, |k| {
+        format!("{};{:.0}", format!("{:.9}", 45471.5 + k as f64 / 86_400.0).replace('.', ","), pv(k))
+    });
     assert_eq!(import(&serials).report.time, TimeKind::ExcelSerials);
 }
 
@@ -257,7 +292,8 @@ fn falling_time_and_runs_out_of_order() {
     assert_eq!(column(&log, "pv")[0], 19.0);
     assert_eq!(log.report.repairs, [Repair::FallingTime]);
     assert_eq!(log.table.lines[0], 21);
-    let days = rows("time,pv\n", 20, |k| format!("2024-06-{} 14:35:{:02},{k}", if k < 10 { 29 } else { 28 }, k));
+    let days =
+        rows("time,pv\n", 20, |k| format!("2024-06-{} 14:35:{:02},{k}", if k < 10 { 29 } else { 28 }, k));
     let log = import(&days);
     assert_eq!(log.table.len(), 20);
     assert_eq!(column(&log, "pv")[0], 10.0);
@@ -274,9 +310,20 @@ fn clocks_change_and_zones_do_not() {
     let log = import(&summer);
     assert_eq!(log.table.len(), 24);
     assert_eq!(log.table.time_s[23], 23.0 * 600.0);
-    assert!(matches!(log.report.repairs[..], [Repair::ClockSetBack { line: 14 }]), "{:?}", log.report.repairs);
+    assert!(
+        matches!(log.report.repairs[..], [Repair::ClockSetBack { line: 14 }]),
+        "{:?}",
+        log.report.repairs
+    );
     let zoned = rows("time,pv\n", 4, |k| {
-        ["2024-10-27T02:40:00+02:00", "2024-10-27T02:50:00+02:00", "2024-10-27T02:00:00+01:00", "2024-10-27T02:10:00+01:00"][k].to_owned() + ",1"
+        [
+            "2024-10-27T02:40:00+02:00",
+            "2024-10-27T02:50:00+02:00",
+            "2024-10-27T02:00:00+01:00",
+            "2024-10-27T02:10:00+01:00",
+        ][k]
+            .to_owned()
+            + ",1"
     });
     let log = import(&zoned);
     assert_eq!(log.table.time_s, [0.0, 600.0, 1200.0, 1800.0]);
@@ -301,7 +348,9 @@ fn headers_of_several_rows() {
     assert_eq!(names(&log), ["LT-101.PV", "SC-101.OUT", "LIC-101.SP"]);
     assert_eq!(log.table.columns[1].unit.as_deref(), Some("%"));
     assert_eq!(log.report.first_data_line, 4);
-    let grouped = rows("time,TIC1,,TIC2,\n,PV,OP,PV,OP\n", 20, |k| format!("{k},{:.2},{:.2},{:.2},{:.2}", pv(k), mv(k), pv(k + 3), mv(k + 5)));
+    let grouped = rows("time,TIC1,,TIC2,\n,PV,OP,PV,OP\n", 20, |k| {
+        format!("{k},{:.2},{:.2},{:.2},{:.2}", pv(k), mv(k), pv(k + 3), mv(k + 5))
+    });
     assert_eq!(names(&import(&grouped)), ["TIC1 PV", "TIC1 OP", "TIC2 PV", "TIC2 OP"]);
 }
 
@@ -313,7 +362,10 @@ fn frozen_and_oversampled_signals_are_told_and_left() {
     });
     let log = import(&text);
     let r = &log.report.repairs;
-    assert!(r.contains(&Repair::Frozen { column: "LT.PV".into(), line: 202, rows: 100, length_s: 99.0 }), "{r:?}");
+    assert!(
+        r.contains(&Repair::Frozen { column: "LT.PV".into(), line: 202, rows: 100, length_s: 99.0 }),
+        "{r:?}"
+    );
     assert!(r.contains(&Repair::Oversampled { column: "TT.PV".into(), rows: 5, period_s: 5.0 }), "{r:?}");
     assert_eq!(log.table.len(), 400);
 }

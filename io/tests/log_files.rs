@@ -101,12 +101,20 @@ fn files_of_the_same_columns_follow_one_another() {
 #[test]
 fn files_without_dates_are_put_one_behind_the_other() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = |k: usize| format!("time,pv,mode\n{}", (0..10).map(|t| format!("{}.0,{k}.{t},{}\n", 2 * t, ["AUTO", "MAN"][k % 2])).collect::<String>());
+    let run = |k: usize| {
+        format!(
+            "time,pv,mode\n{}",
+            (0..10).map(|t| format!("{}.0,{k}.{t},{}\n", 2 * t, ["AUTO", "MAN"][k % 2])).collect::<String>()
+        )
+    };
     let paths = [file(folder.path(), "1.csv", &run(0)), file(folder.path(), "2.csv", &run(1))];
     let log = open_logs(&paths, &ImportOptions::default()).expect("a log");
     assert_eq!(log.table.time_s[10], 20.0);
     let mode = log.table.column("mode").expect("a mode");
-    assert_eq!((mode.states.as_slice(), mode.values[9], mode.values[10]), (["AUTO".to_owned(), "MAN".to_owned()].as_slice(), 0.0, 1.0));
+    assert_eq!(
+        (mode.states.as_slice(), mode.values[9], mode.values[10]),
+        (["AUTO".to_owned(), "MAN".to_owned()].as_slice(), 0.0, 1.0)
+    );
     assert!(log.report.repairs.contains(&Repair::Appended { file: "2.csv".into(), step_s: 2.0 }));
 }
 

@@ -6,7 +6,8 @@ use logs::{for_each_log, read_log, skip};
 use vasos_engine::explain::Explain;
 use vasos_engine::signal::{LogStart, derived_column};
 use vasos_io::log::{
-    Decimal, Encoding, ImportError, ImportOptions, ImportedLog, Repair, Separator, TextFormat, TimeKind, import_log,
+    Decimal, Encoding, ImportError, ImportOptions, ImportedLog, Repair, Separator, TextFormat, TimeKind,
+    import_log,
 };
 
 fn import(text: &str) -> ImportedLog {

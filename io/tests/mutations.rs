@@ -27,9 +27,40 @@ fn count() -> usize {
 
 /// What a damaged file has in it.
 const TOKENS: [&[u8]; 34] = [
-    b",", b";", b"\t", b"||", b"|", b"\n", b"\r\n", b"\r", b" ", b"\"", b"'", b"-", b".", b"e", b"1e999", b"NaN", b"inf",
-    b"#", b"[", b"]", b"=", b"->", b":", b"T1:", b"0", b"99999999999999999999", b"2024-01-02", b"10:00:00", b"31/02/2024",
-    b"\xff", b"\0", b"\xEF\xBB\xBF", b"\xC3\xA9", b"Bad",
+    b",",
+    b";",
+    b"\t",
+    b"||",
+    b"|",
+    b"\n",
+    b"\r\n",
+    b"\r",
+    b" ",
+    b"\"",
+    b"'",
+    b"-",
+    b".",
+    b"e",
+    b"1e999",
+    b"NaN",
+    b"inf",
+    b"#",
+    b"[",
+    b"]",
+    b"=",
+    b"->",
+    b":",
+    b"T1:",
+    b"0",
+    b"99999999999999999999",
+    b"2024-01-02",
+    b"10:00:00",
+    b"31/02/2024",
+    b"\xff",
+    b"\0",
+    b"\xEF\xBB\xBF",
+    b"\xC3\xA9",
+    b"Bad",
 ];
 
 fn mutate(random: &mut Xoshiro256PlusPlus, bytes: &mut Vec<u8>, others: &[Vec<u8>]) {
@@ -122,7 +153,22 @@ fn value_at(log: &ImportedLog, line: u32, column: &str) -> Option<f64> {
 #[test]
 fn a_spoilt_field_leaves_the_other_numbers_alone() {
     const SPOILT: [&str; 16] = [
-        "", "Bad", "x", "-", "1.2.3", "99999", "-0", "é", "#", "I/O Timeout", "No Data", "1e400", "2024", "nan", "?", "12:61",
+        "",
+        "Bad",
+        "x",
+        "-",
+        "1.2.3",
+        "99999",
+        "-0",
+        "é",
+        "#",
+        "I/O Timeout",
+        "No Data",
+        "1e400",
+        "2024",
+        "nan",
+        "?",
+        "12:61",
     ];
     let seeds: Vec<Seed> = log_seeds().into_iter().filter(|seed| seed.is_table).collect();
     let whole: Vec<ImportedLog> = seeds
@@ -147,6 +193,10 @@ fn a_spoilt_field_leaves_the_other_numbers_alone() {
                         continue;
                     }
                     let (then, now) = (column.values[k], value_at(&log, other, &column.name));
+                    // A row whose time was spoilt is left out, and that is told.
+                    if other == line && now.is_none() && !log.report.repairs.is_empty() {
+                        continue;
+                    }
                     let same = now.is_some_and(|now| now == then || (now.is_nan() && then.is_nan()));
                     assert!(same, "{} in line {other}: {then} became {now:?}", column.name);
                 }

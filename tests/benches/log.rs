@@ -29,7 +29,12 @@ fn messy() -> String {
     let mut text = format!("time;{};mode;valve\n", names.join(";"));
     for row in 0..ROWS {
         let (day, second) = (1 + row / 86_400, row % 86_400);
-        text.push_str(&format!("{day:02}.03.2024 {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60));
+        text.push_str(&format!(
+            "{day:02}.03.2024 {:02}:{:02}:{:02}",
+            second / 3600,
+            second / 60 % 60,
+            second % 60
+        ));
         for column in 1..8 {
             match (row * 31 + column * 17) % 700 {
                 0 => text.push_str(";Bad"),

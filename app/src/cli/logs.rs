@@ -180,7 +180,8 @@ fn text(log: &ImportedLog) -> String {
         let parts = [("PV", &roles.pv), ("SP", &roles.sp), ("MV", &roles.mv), ("mode", &roles.mode)];
         parts.iter().find(|(_, column)| column.as_deref() == Some(name)).map_or("", |(part, _)| part)
     };
-    let mut rows = vec![["column", "unit", "proposed", "lowest", "highest", "missing"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["column", "unit", "proposed", "lowest", "highest", "missing"].map(str::to_owned).to_vec()];
     for column in &log_table.columns {
         let (lowest, highest, missing) = extent(column);
         let ends = if column.states.is_empty() {
@@ -201,7 +202,11 @@ fn text(log: &ImportedLog) -> String {
     }
     out.push_str(&table(&rows));
     let repairs = repairs(report);
-    out.push_str(if repairs.is_empty() { "\nnothing had to be repaired\n" } else { "\nrepaired or worth knowing:\n" });
+    out.push_str(if repairs.is_empty() {
+        "\nnothing had to be repaired\n"
+    } else {
+        "\nrepaired or worth knowing:\n"
+    });
     for repair in repairs {
         out.push_str(&format!("  {repair}\n"));
     }

@@ -67,7 +67,9 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
     }
     match open_log(path, options) {
         Ok(log) => Outcome::Log(path.to_owned(), Box::new(log)),
-        Err(ImportError::Read { reason }) => Outcome::Failed(Box::new(FileError::Read { path: shown, reason })),
+        Err(ImportError::Read { reason }) => {
+            Outcome::Failed(Box::new(FileError::Read { path: shown, reason }))
+        }
         Err(error) => Outcome::Failed(Box::new(error)),
     }
 }

@@ -22,8 +22,8 @@ pub(super) struct Source {
 /// Makes the log.
 ///
 /// # Errors
-/// [`ImportError::OnlyTime`] when nothing stands beside the time, [`ImportError::FewNumbers`],
-/// [`ImportError::NoSuchTimeColumn`].
+/// [`ImportError::OneRow`] when fewer than two rows have a time, [`ImportError::OnlyTime`] when nothing stands beside it,
+/// [`ImportError::FewNumbers`], [`ImportError::NoSuchTimeColumn`].
 pub(super) fn assemble(
     name: &str,
     read: Read,
@@ -33,6 +33,9 @@ pub(super) fn assemble(
 ) -> Result<ImportedLog, ImportError> {
     let mut read = arrange(read, options, &mut repairs);
     let axis = axis::find(&mut read, options, &mut repairs)?;
+    if axis.time_s.len() < 2 {
+        return Err(ImportError::OneRow { line: source.first_data_line });
+    }
     let time_column = axis.columns.first().map(|&i| read.columns[i].name.clone());
     let mut columns = Vec::new();
     for (i, column) in std::mem::take(&mut read.columns).into_iter().enumerate() {

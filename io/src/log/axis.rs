@@ -91,7 +91,9 @@ fn choose(read: &Read) -> Vec<usize> {
     match (of_kind(Kind::Date), of_kind(Kind::Clock)) {
         (Some(date), Some(clock)) => return vec![date, clock],
         (None, Some(clock)) => return vec![clock],
-        (Some(date), None) if moves_on(&read.columns[date].values) || falls_steadily(&read.columns[date].values) => {
+        (Some(date), None)
+            if moves_on(&read.columns[date].values) || falls_steadily(&read.columns[date].values) =>
+        {
             return vec![date];
         }
         _ => {}
@@ -101,7 +103,11 @@ fn choose(read: &Read) -> Vec<usize> {
     let ticking = named.filter(|&i| ticks(&read.columns[i].values));
     // A single letter may be a temperature: of several candidates the longer word, the steadier, the first.
     let rank = |&i: &usize| {
-        (read.columns[i].name.chars().count() > 1, is_clocklike(&read.columns[i].values), std::cmp::Reverse(i))
+        (
+            read.columns[i].name.chars().count() > 1,
+            is_clocklike(&read.columns[i].values),
+            std::cmp::Reverse(i),
+        )
     };
     if let Some(named) = ticking.max_by_key(rank) {
         return vec![named];
@@ -146,7 +152,10 @@ pub(super) fn is_time_name(name: &str) -> bool {
     ];
     let lower = name.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
-    words.next().is_some_and(|w| NAMES.contains(&w)) || lower.contains("time") || lower == "x_value" || lower.contains("tempo (")
+    words.next().is_some_and(|w| NAMES.contains(&w))
+        || lower.contains("time")
+        || lower == "x_value"
+        || lower.contains("tempo (")
 }
 
 fn steps(values: &[f64]) -> impl Iterator<Item = f64> + '_ {

@@ -101,7 +101,9 @@ impl Taken<'_> {
             return None;
         }
         match kind {
-            Kind::Number => number::scan(bytes, from, self.mark).filter(|(_, after)| *after == to).map(|v| v.0),
+            Kind::Number => {
+                number::scan(bytes, from, self.mark).filter(|(_, after)| *after == to).map(|v| v.0)
+            }
             Kind::Words => self.columns[column].known_state(field).map(f64::from),
             Kind::Full | Kind::Date | Kind::Clock => {
                 let stamp = self.stamps[column].read(field)?;

@@ -115,7 +115,8 @@ fn beside(logs: &[ImportedLog], repairs: &mut Vec<Repair>) -> LogTable {
         let offset_s = start_s(log);
         for column in &log.table.columns {
             let points = log.table.time_s.iter().zip(&column.values).zip(&log.table.lines);
-            let points = points.map(|((t, &value), &line)| Point { time_s: t + offset_s, value, line }).collect();
+            let points =
+                points.map(|((t, &value), &line)| Point { time_s: t + offset_s, value, line }).collect();
             let taken = series.iter().any(|s| s.name == column.name);
             let name =
                 if taken { format!("{} ({})", column.name, log.table.name) } else { column.name.clone() };
@@ -137,7 +138,13 @@ fn beside(logs: &[ImportedLog], repairs: &mut Vec<Repair>) -> LogTable {
     });
     let start = logs.iter().min_by(|a, b| start_s(a).total_cmp(&start_s(b)));
     let start = start.map_or(LogStart::Unknown, |log| log.table.start.clone());
-    LogTable { name: String::new(), time_s: merged.time_s, start, columns: columns.collect(), lines: merged.lines }
+    LogTable {
+        name: String::new(),
+        time_s: merged.time_s,
+        start,
+        columns: columns.collect(),
+        lines: merged.lines,
+    }
 }
 
 fn empty() -> LogTable {

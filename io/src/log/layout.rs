@@ -132,7 +132,8 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
         layout.first_row = rows[1];
         layout.header_line = Some(rows[0] + 1);
     }
-    let all: Vec<&str> = lines[layout.first_row..].iter().copied().chain(sample.beyond.iter().map(String::as_str)).collect();
+    let all: Vec<&str> =
+        lines[layout.first_row..].iter().copied().chain(sample.beyond.iter().map(String::as_str)).collect();
     find_columns(&all, &mut layout);
     if let Some(order) = options.date_order {
         layout.date_order = order;
@@ -270,7 +271,9 @@ impl Dates {
             return;
         }
         for (k, order) in [DateOrder::DayFirst, DateOrder::MonthFirst].into_iter().enumerate() {
-            let Some(stamp @ (Stamp::Full { .. } | Stamp::Date(_))) = parse_stamp(field, order) else { continue };
+            let Some(stamp @ (Stamp::Full { .. } | Stamp::Date(_))) = parse_stamp(field, order) else {
+                continue;
+            };
             let s = stamp.seconds();
             let [from, to] = self.ends_s[k].unwrap_or([s, s]);
             self.ends_s[k] = Some([from.min(s), to.max(s)]);

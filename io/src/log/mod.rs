@@ -48,7 +48,9 @@ use vasos_engine::signal::LogTable;
 pub use error::ImportError;
 pub use open::{import_log, open_log, open_logs};
 pub use repair::Repair;
-pub use report::{Decimal, Encoding, FileFormat, ImportReport, JoinedFile, Roles, Separator, TextFormat, TimeKind};
+pub use report::{
+    Decimal, Encoding, FileFormat, ImportReport, JoinedFile, Roles, Separator, TextFormat, TimeKind,
+};
 pub use stamp::DateOrder;
 
 /// What the user may say about a file ahead of its import; all of it can be found out.

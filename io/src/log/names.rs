@@ -13,8 +13,8 @@ const UNITS: [&str; 84] = [
     "degc", "c", "°f", "degf", "f", "k", "v", "mv", "volts", "a", "ma", "w", "kw", "mw", "bar", "barg",
     "mbar", "pa", "kpa", "mpa", "psi", "psig", "atm", "mmh2o", "mm", "cm", "m", "l", "ml", "m3", "l/s",
     "l/min", "l/h", "ml/s", "cm3/s", "m3/s", "m3/h", "kg", "kg/s", "kg/h", "t/h", "rpm", "hz", "ph", "ppm",
-    "m³/h", "m³/s", "m³", "cm³/s", "nm3/h", "nm³/h", "kg/m3", "kg/m³", "mol/l", "us/cm", "µs/cm", "ntu", "gpm",
-    "gal/min", "lb/h", "klb/h", "scfh", "scfm", "in", "ft", "inh2o", "mg/l", "deg", "°",
+    "m³/h", "m³/s", "m³", "cm³/s", "nm3/h", "nm³/h", "kg/m3", "kg/m³", "mol/l", "us/cm", "µs/cm", "ntu",
+    "gpm", "gal/min", "lb/h", "klb/h", "scfh", "scfm", "in", "ft", "inh2o", "mg/l", "deg", "°",
 ];
 
 /// Whether a word is a unit.

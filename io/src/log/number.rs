@@ -137,7 +137,9 @@ fn slow(field: &str, decimal: Decimal) -> Option<f64> {
     };
     let (whole, fraction) = field.split_once(mark).unwrap_or((field, ""));
     let marked = whole.len() < field.len();
-    if fraction.contains([group, mark, '\'']) || !grouped(whole, group, marked) && !grouped(whole, '\'', marked) {
+    if fraction.contains([group, mark, '\''])
+        || !grouped(whole, group, marked) && !grouped(whole, '\'', marked)
+    {
         return None;
     }
     let plain: String = field
@@ -181,7 +183,9 @@ mod tests {
                 continue;
             }
             let digits = (next() % 19) as usize;
-            for text in [format!("{value:e}"), format!("{:.digits$}", value % 1e9), format!("{}", next() % 1000)] {
+            for text in
+                [format!("{value:e}"), format!("{:.digits$}", value % 1e9), format!("{}", next() % 1000)]
+            {
                 let expected: f64 = text.parse().expect("a number");
                 assert_eq!(parse(&text, Decimal::Point), Some(expected).filter(|v| v.is_finite()), "{text}");
                 let comma = text.replace('.', ",");

@@ -57,7 +57,10 @@ pub fn open_log(path: &Path, options: &ImportOptions) -> Result<ImportedLog, Imp
 ///
 /// # Errors
 /// The first [`ImportError`] with the path of its file; [`ImportError::NotJoinable`] where files have no clock in common.
-pub fn open_logs<P: AsRef<Path>>(paths: &[P], options: &ImportOptions) -> Result<ImportedLog, (String, ImportError)> {
+pub fn open_logs<P: AsRef<Path>>(
+    paths: &[P],
+    options: &ImportOptions,
+) -> Result<ImportedLog, (String, ImportError)> {
     let mut logs = Vec::with_capacity(paths.len());
     for path in paths {
         let path = path.as_ref();

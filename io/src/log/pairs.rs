@@ -67,7 +67,8 @@ pub(super) fn join(read: Read, blocks: &[Block], repairs: &mut Vec<Repair>) -> R
         // Shorter blocks end in blanks, which are no missing times.
         repairs.retain(|r| !is_blank_of(r, &time.name));
         for &i in &block.columns {
-            let short = read.columns[i].values.iter().zip(&time.values).all(|(v, t)| !v.is_nan() || t.is_nan());
+            let short =
+                read.columns[i].values.iter().zip(&time.values).all(|(v, t)| !v.is_nan() || t.is_nan());
             repairs.retain(|r| !(short && is_blank_of(r, &read.columns[i].name)));
         }
     }

@@ -94,7 +94,9 @@ fn route(kind: &DataType) -> Option<Route> {
         DataType::Duration(unit) => Route::Ticks(Kind::Number, unit_s(*unit)),
         DataType::Boolean => Route::Flag,
         DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => Route::Text,
-        DataType::Dictionary(_, value) => route(value).filter(|r| matches!(r, Route::Text | Route::Number))?,
+        DataType::Dictionary(_, value) => {
+            route(value).filter(|r| matches!(r, Route::Text | Route::Number))?
+        }
         number if number.is_numeric() => Route::Number,
         _ => return None,
     })

@@ -10,18 +10,79 @@ use super::{ImportOptions, Repair};
 
 /// Names that columns have in such exports, without marks and in lower case.
 const TAG_NAMES: [&str; 34] = [
-    "tag", "tagname", "varname", "variable", "variablename", "name", "point", "pointname", "pointid", "signal",
-    "signalname", "item", "itemname", "itemid", "channel", "channelname", "sensor", "sensorname", "tagid", "tagpath",
-    "messstelle", "kanal", "parameter", "parametername", "field", "series", "metric", "node", "nodeid", "displayname",
-    "fullname", "variavel", "sinal", "instrumento",
+    "tag",
+    "tagname",
+    "varname",
+    "variable",
+    "variablename",
+    "name",
+    "point",
+    "pointname",
+    "pointid",
+    "signal",
+    "signalname",
+    "item",
+    "itemname",
+    "itemid",
+    "channel",
+    "channelname",
+    "sensor",
+    "sensorname",
+    "tagid",
+    "tagpath",
+    "messstelle",
+    "kanal",
+    "parameter",
+    "parametername",
+    "field",
+    "series",
+    "metric",
+    "node",
+    "nodeid",
+    "displayname",
+    "fullname",
+    "variavel",
+    "sinal",
+    "instrumento",
 ];
 const VALUE_NAMES: [&str; 19] = [
-    "value", "varvalue", "val", "vvalue", "wert", "messwert", "valor", "reading", "floatvalue", "doublevalue",
-    "numericvalue", "avg", "average", "avgvalue", "data", "datavalue", "pointvalue", "measurement", "result",
+    "value",
+    "varvalue",
+    "val",
+    "vvalue",
+    "wert",
+    "messwert",
+    "valor",
+    "reading",
+    "floatvalue",
+    "doublevalue",
+    "numericvalue",
+    "avg",
+    "average",
+    "avgvalue",
+    "data",
+    "datavalue",
+    "pointvalue",
+    "measurement",
+    "result",
 ];
 const QUALITY_NAMES: [&str; 16] = [
-    "quality", "validity", "confidence", "qual", "qualitydetail", "opcquality", "dataintegrity", "good", "isgood",
-    "qualidade", "qualitat", "gultigkeit", "guete", "statuscode", "qualitycode", "q",
+    "quality",
+    "validity",
+    "confidence",
+    "qual",
+    "qualitydetail",
+    "opcquality",
+    "dataintegrity",
+    "good",
+    "isgood",
+    "qualidade",
+    "qualitat",
+    "gultigkeit",
+    "guete",
+    "statuscode",
+    "qualitycode",
+    "q",
 ];
 /// A signal needs this many values on average for names to be those of signals.
 const FEWEST_VALUES: usize = 2;
@@ -53,11 +114,14 @@ pub(super) fn find(read: &Read, options: &ImportOptions) -> Option<Long> {
     let time = time_columns(read, options)?;
     let is_number = |c: &ReadColumn| c.kind == Kind::Number;
     let quality = named(read, &QUALITY_NAMES, |c| matches!(c.kind, Kind::Number | Kind::Words));
-    let unit = named(read, &["unit", "units", "engunits", "einheit", "unidade", "uom"], |c| c.kind == Kind::Words);
+    let unit =
+        named(read, &["unit", "units", "engunits", "einheit", "unidade", "uom"], |c| c.kind == Kind::Words);
     let value = named(read, &VALUE_NAMES, is_number);
     let words = |c: &ReadColumn| c.kind == Kind::Words && !c.states.is_empty();
     let tag = named(read, &TAG_NAMES, words).or_else(|| {
-        named(read, &["tagid", "pointid", "itemid", "channel"], |c| is_number(c) && few_whole_numbers(&c.values))
+        named(read, &["tagid", "pointid", "itemid", "channel"], |c| {
+            is_number(c) && few_whole_numbers(&c.values)
+        })
     });
     if let (Some(tag), Some(value)) = (tag, value)
         && !time.contains(&tag)
@@ -117,7 +181,9 @@ fn time_columns(read: &Read, options: &ImportOptions) -> Option<Vec<usize>> {
         return Some(vec![date, clock]);
     }
     let names = ["time", "timestamp", "datetime", "tstamp", "ts", "times", "date", "zeit", "tempo", "epoch"];
-    of(Kind::Date).map(|date| vec![date]).or_else(|| named(read, &names, |c| c.kind == Kind::Number).map(|i| vec![i]))
+    of(Kind::Date)
+        .map(|date| vec![date])
+        .or_else(|| named(read, &names, |c| c.kind == Kind::Number).map(|i| vec![i]))
 }
 
 /// Turns the layout.
@@ -168,10 +234,15 @@ fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
             continue;
         }
         let at = *order.entry(tag.to_bits()).or_insert_with(|| {
-            let name = tags.states.get(tag as usize).cloned().unwrap_or_else(|| format!("{} {tag}", tags.name));
+            let name =
+                tags.states.get(tag as usize).cloned().unwrap_or_else(|| format!("{} {tag}", tags.name));
             let unit = long.unit.and_then(|u| {
                 let units = &read.columns[u];
-                units.states.get(units.values[row] as usize).filter(|_| units.values[row].is_finite()).cloned()
+                units
+                    .states
+                    .get(units.values[row] as usize)
+                    .filter(|_| units.values[row].is_finite())
+                    .cloned()
             });
             series.push(Series { name, unit, states: Vec::new(), points: Vec::new() });
             words.push(0);
@@ -184,7 +255,11 @@ fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
             Some(word) => -f64::from(word) - 1.0,
             None => values.values[row],
         };
-        let point = Point { time_s: time_s(row), value: if is_good { value } else { f64::NAN }, line: read.lines[row] };
+        let point = Point {
+            time_s: time_s(row),
+            value: if is_good { value } else { f64::NAN },
+            line: read.lines[row],
+        };
         series[at].points.push(point);
         if word.is_some() {
             series[at].states.push(String::new());
@@ -242,5 +317,7 @@ fn good_rows(column: &ReadColumn) -> Vec<bool> {
 
 fn is_bad(word: &str) -> bool {
     let word = word.to_lowercase();
-    ["bad", "false", "invalid", "no", "ruim", "schlecht", "ungültig", "comm"].iter().any(|b| word.starts_with(b))
+    ["bad", "false", "invalid", "no", "ruim", "schlecht", "ungültig", "comm"]
+        .iter()
+        .any(|b| word.starts_with(b))
 }

@@ -38,7 +38,10 @@ pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, 
     let unit = Some("s".to_owned());
     let mut columns = vec![ReadColumn::new("time".to_owned(), unit, Kind::Number, merged.time_s)];
     columns.extend(
-        series.into_iter().zip(merged.columns).map(|(s, values)| ReadColumn::new(s.name, s.unit, Kind::Number, values)),
+        series
+            .into_iter()
+            .zip(merged.columns)
+            .map(|(s, values)| ReadColumn::new(s.name, s.unit, Kind::Number, values)),
     );
     let lines = (1..=columns[0].values.len() as u32).collect();
     let source = Source { format: FileFormat::Recording, header_line: None, first_data_line: 1 };
@@ -61,10 +64,8 @@ fn signals(column: &RecordedColumn) -> Vec<Series> {
     };
     let one = |i: usize| {
         let (name, unit) = name(i);
-        let points = column.time_s.iter().zip(&column.values).enumerate().map(|(row, (&time_s, values))| Point {
-            time_s,
-            value: values.get(i).copied().unwrap_or(f64::NAN),
-            line: row as u32 + 1,
+        let points = column.time_s.iter().zip(&column.values).enumerate().map(|(row, (&time_s, values))| {
+            Point { time_s, value: values.get(i).copied().unwrap_or(f64::NAN), line: row as u32 + 1 }
         });
         Series { name, unit, states: Vec::new(), points: points.collect() }
     };

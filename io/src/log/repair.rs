@@ -284,24 +284,76 @@ impl std::fmt::Display for Repair {
                 "gaps of more than three sample times: {count}, the first before line {line}, the longest {} s",
                 number(*longest_s)
             ),
-            Self::FallingTime => write!(f, "the rows ran from the newest to the oldest: they were turned round"),
-            Self::SortedRows { line } => write!(f, "the rows were not in the order of time, first in line {line}: they were sorted by their stamps"),
-            Self::ClockSetBack { line } => write!(f, "the clock goes back by an hour in line {line}, as at the end of summer time: the rows from there on were moved on by an hour"),
-            Self::SpareTime { column } => write!(f, "column {column} holds time stamps beside those of the time axis: left out"),
-            Self::LongLayout { column, signals, rows } => write!(f, "one row a value: {rows} rows were turned into {signals} columns by the names in {column}"),
-            Self::BadQuality { column, count, line } => write!(f, "values that {column} calls bad were taken as missing: {count}, the first in line {line}"),
-            Self::ServiceRows { name, count, line } => write!(f, "rows under the name {name}, which is none of a signal, were left out: {count}, the first is line {line}"),
-            Self::JoinedStamps { within_s, rows } => write!(f, "the signals have stamps of their own: those within {} s of each other made one row, {rows} in all", number(*within_s)),
-            Self::HeldValues { column, count, longest_s } => write!(f, "values of {column} held from before, because it has none of its own at that time: {count}, the longest for {} s", number(*longest_s)),
-            Self::ReplacedValues { column, count, line } => write!(f, "values of {column} left out because a later one falls into the same row: {count}, the first in line {line}"),
-            Self::OwnTimes { columns } => write!(f, "the columns have times of their own ({columns}): they were brought onto one axis"),
-            Self::Frozen { column, line, rows, length_s } => write!(f, "{column} is frozen for {rows} rows, {} s, from line {line} on: left as it is", number(*length_s)),
-            Self::Oversampled { column, rows, period_s } => write!(f, "{column} is oversampled: it changes only every {rows} rows, {} s; left as it is", number(*period_s)),
-            Self::OtherSheets { sheet, others } => write!(f, "sheet {sheet} was taken; the workbook also has {others}"),
-            Self::OtherRuns { run, others } => write!(f, "of several runs in the recording the longest was taken: {run}; others: {others}"),
-            Self::FileJoined { file, line, rows } => write!(f, "{file} was joined on from row {line} on: {rows} rows"),
-            Self::FileMerged { file, columns } => write!(f, "{columns} columns of {file} were put beside the others by their time"),
-            Self::Overlap { file, count, length_s } => write!(f, "rows of {file} left out because the log already covers their time: {count}, {} s", number(*length_s)),
+            Self::FallingTime => {
+                write!(f, "the rows ran from the newest to the oldest: they were turned round")
+            }
+            Self::SortedRows { line } => write!(
+                f,
+                "the rows were not in the order of time, first in line {line}: they were sorted by their stamps"
+            ),
+            Self::ClockSetBack { line } => write!(
+                f,
+                "the clock goes back by an hour in line {line}, as at the end of summer time: the rows from there on were moved on by an hour"
+            ),
+            Self::SpareTime { column } => {
+                write!(f, "column {column} holds time stamps beside those of the time axis: left out")
+            }
+            Self::LongLayout { column, signals, rows } => write!(
+                f,
+                "one row a value: {rows} rows were turned into {signals} columns by the names in {column}"
+            ),
+            Self::BadQuality { column, count, line } => write!(
+                f,
+                "values that {column} calls bad were taken as missing: {count}, the first in line {line}"
+            ),
+            Self::ServiceRows { name, count, line } => write!(
+                f,
+                "rows under the name {name}, which is none of a signal, were left out: {count}, the first is line {line}"
+            ),
+            Self::JoinedStamps { within_s, rows } => write!(
+                f,
+                "the signals have stamps of their own: those within {} s of each other made one row, {rows} in all",
+                number(*within_s)
+            ),
+            Self::HeldValues { column, count, longest_s } => write!(
+                f,
+                "values of {column} held from before, because it has none of its own at that time: {count}, the longest for {} s",
+                number(*longest_s)
+            ),
+            Self::ReplacedValues { column, count, line } => write!(
+                f,
+                "values of {column} left out because a later one falls into the same row: {count}, the first in line {line}"
+            ),
+            Self::OwnTimes { columns } => {
+                write!(f, "the columns have times of their own ({columns}): they were brought onto one axis")
+            }
+            Self::Frozen { column, line, rows, length_s } => write!(
+                f,
+                "{column} is frozen for {rows} rows, {} s, from line {line} on: left as it is",
+                number(*length_s)
+            ),
+            Self::Oversampled { column, rows, period_s } => write!(
+                f,
+                "{column} is oversampled: it changes only every {rows} rows, {} s; left as it is",
+                number(*period_s)
+            ),
+            Self::OtherSheets { sheet, others } => {
+                write!(f, "sheet {sheet} was taken; the workbook also has {others}")
+            }
+            Self::OtherRuns { run, others } => {
+                write!(f, "of several runs in the recording the longest was taken: {run}; others: {others}")
+            }
+            Self::FileJoined { file, line, rows } => {
+                write!(f, "{file} was joined on from row {line} on: {rows} rows")
+            }
+            Self::FileMerged { file, columns } => {
+                write!(f, "{columns} columns of {file} were put beside the others by their time")
+            }
+            Self::Overlap { file, count, length_s } => write!(
+                f,
+                "rows of {file} left out because the log already covers their time: {count}, {} s",
+                number(*length_s)
+            ),
             Self::Appended { file, step_s } => {
                 write!(f, "{file} has no dates: it was put {} s behind the last row before", number(*step_s))
             }
@@ -388,20 +440,47 @@ impl Explain for Repair {
             Self::SortedRows { line } => vec![("line", line.to_string())],
             Self::ClockSetBack { line } => vec![("line", line.to_string())],
             Self::SpareTime { column } => vec![("column", column.clone())],
-            Self::LongLayout { column, signals, rows } => vec![("column", column.clone()), ("signals", signals.to_string()), ("rows", rows.to_string())],
-            Self::BadQuality { column, count, line } => vec![("column", column.clone()), ("count", count.to_string()), ("line", line.to_string())],
-            Self::ServiceRows { name, count, line } => vec![("name", name.clone()), ("count", count.to_string()), ("line", line.to_string())],
-            Self::JoinedStamps { within_s, rows } => vec![("within_s", number(*within_s)), ("rows", rows.to_string())],
-            Self::HeldValues { column, count, longest_s } => vec![("column", column.clone()), ("count", count.to_string()), ("longest_s", number(*longest_s))],
-            Self::ReplacedValues { column, count, line } => vec![("column", column.clone()), ("count", count.to_string()), ("line", line.to_string())],
+            Self::LongLayout { column, signals, rows } => {
+                vec![("column", column.clone()), ("signals", signals.to_string()), ("rows", rows.to_string())]
+            }
+            Self::BadQuality { column, count, line } => {
+                vec![("column", column.clone()), ("count", count.to_string()), ("line", line.to_string())]
+            }
+            Self::ServiceRows { name, count, line } => {
+                vec![("name", name.clone()), ("count", count.to_string()), ("line", line.to_string())]
+            }
+            Self::JoinedStamps { within_s, rows } => {
+                vec![("within_s", number(*within_s)), ("rows", rows.to_string())]
+            }
+            Self::HeldValues { column, count, longest_s } => vec![
+                ("column", column.clone()),
+                ("count", count.to_string()),
+                ("longest_s", number(*longest_s)),
+            ],
+            Self::ReplacedValues { column, count, line } => {
+                vec![("column", column.clone()), ("count", count.to_string()), ("line", line.to_string())]
+            }
             Self::OwnTimes { columns } => vec![("columns", columns.clone())],
-            Self::Frozen { column, line, rows, length_s } => vec![("column", column.clone()), ("line", line.to_string()), ("rows", rows.to_string()), ("length_s", number(*length_s))],
-            Self::Oversampled { column, rows, period_s } => vec![("column", column.clone()), ("rows", rows.to_string()), ("period_s", number(*period_s))],
+            Self::Frozen { column, line, rows, length_s } => vec![
+                ("column", column.clone()),
+                ("line", line.to_string()),
+                ("rows", rows.to_string()),
+                ("length_s", number(*length_s)),
+            ],
+            Self::Oversampled { column, rows, period_s } => {
+                vec![("column", column.clone()), ("rows", rows.to_string()), ("period_s", number(*period_s))]
+            }
             Self::OtherSheets { sheet, others } => vec![("sheet", sheet.clone()), ("others", others.clone())],
             Self::OtherRuns { run, others } => vec![("run", run.clone()), ("others", others.to_string())],
-            Self::FileJoined { file, line, rows } => vec![("file", file.clone()), ("line", line.to_string()), ("rows", rows.to_string())],
-            Self::FileMerged { file, columns } => vec![("file", file.clone()), ("columns", columns.to_string())],
-            Self::Overlap { file, count, length_s } => vec![("file", file.clone()), ("count", count.to_string()), ("length_s", number(*length_s))],
+            Self::FileJoined { file, line, rows } => {
+                vec![("file", file.clone()), ("line", line.to_string()), ("rows", rows.to_string())]
+            }
+            Self::FileMerged { file, columns } => {
+                vec![("file", file.clone()), ("columns", columns.to_string())]
+            }
+            Self::Overlap { file, count, length_s } => {
+                vec![("file", file.clone()), ("count", count.to_string()), ("length_s", number(*length_s))]
+            }
             Self::Appended { file, step_s } => vec![("file", file.clone()), ("step_s", number(*step_s))],
             Self::AmbiguousDates => Vec::new(),
             Self::NoTimeColumn { sample_time_s } => vec![("sample_time_s", number(*sample_time_s))],

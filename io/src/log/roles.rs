@@ -39,7 +39,8 @@ pub(super) fn propose(table: &LogTable) -> Roles {
     let mut sp = best_named(&hints, Role::Sp, &taken, |i| (true, kin(i)));
     taken.extend(sp);
     let not_words: Vec<usize> = taken.iter().copied().filter(|i| !words.contains(i)).collect();
-    let mode = best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| words.first().copied());
+    let mode =
+        best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| words.first().copied());
     taken.extend(mode);
     // A likely name on a column that never moves gives way to one that does.
     let named_mv = mv;

@@ -210,7 +210,11 @@ impl<'a> Reader<'a> {
             self.ragged.add(line);
         }
         if layout.used.len() < layout.fields
-            && fields.iter().take(layout.fields).enumerate().any(|(at, f)| !f.is_empty() && !layout.used.contains(&at))
+            && fields
+                .iter()
+                .take(layout.fields)
+                .enumerate()
+                .any(|(at, f)| !f.is_empty() && !layout.used.contains(&at))
         {
             self.again = Some(Again::Fields);
         }
@@ -283,11 +287,21 @@ impl<'a> Reader<'a> {
             let column_name = || column.name.clone();
             if missing.unread.count > 0 {
                 let Tally { count, line } = missing.unread;
-                repairs.push(Repair::MissingValues { column: column_name(), count, line, text: missing.text });
+                repairs.push(Repair::MissingValues {
+                    column: column_name(),
+                    count,
+                    line,
+                    text: missing.text,
+                });
             }
             if missing.empty.count > 0 && !column.is_text_only() {
                 let Tally { count, line } = missing.empty;
-                repairs.push(Repair::MissingValues { column: column_name(), count, line, text: String::new() });
+                repairs.push(Repair::MissingValues {
+                    column: column_name(),
+                    count,
+                    line,
+                    text: String::new(),
+                });
             }
         }
         let order_told = self.stamps.iter().any(|s| s.day_first || s.month_first);

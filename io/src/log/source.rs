@@ -21,6 +21,8 @@ pub(super) struct Sample {
     pub head: Vec<String>,
     /// Lines from all over the rest of a file that is longer than that.
     pub beyond: Vec<String>,
+    /// Bytes of the file.
+    pub length: u64,
     /// Rows the file will have, as far as one can tell.
     pub expected_lines: usize,
     pub charset: Charset,
@@ -57,7 +59,7 @@ impl Sample {
         }
         let bytes_a_line = head.len() as f64 / (lines.len() + 1) as f64;
         let expected_lines = (length as f64 / bytes_a_line * 1.02) as usize + 16;
-        Ok(Self { head: lines, beyond, expected_lines, charset, line_end })
+        Ok(Self { head: lines, beyond, length, expected_lines, charset, line_end })
     }
 }
 
@@ -70,7 +72,8 @@ fn read_at<R: Read + Seek>(input: &mut R, at: u64, count: usize) -> Result<Vec<u
 
 fn decoded(charset: &Charset, bytes: &[u8]) -> Vec<u8> {
     let Some(mut decoder) = charset.decoder() else { return bytes.to_vec() };
-    let mut text = String::with_capacity(decoder.max_utf8_buffer_length(bytes.len()).unwrap_or(bytes.len() * 3));
+    let mut text =
+        String::with_capacity(decoder.max_utf8_buffer_length(bytes.len()).unwrap_or(bytes.len() * 3));
     let _ = decoder.decode_to_string(bytes, &mut text, true);
     text.into_bytes()
 }
@@ -105,8 +108,8 @@ impl<R: Read + Seek> Blocks<R> {
             input,
             decoder: sample.charset.decoder(),
             line_end: sample.line_end,
-            raw: vec![0; BLOCK],
-            text: Vec::with_capacity(2 * BLOCK),
+            raw: vec![0; BLOCK.min(sample.length as usize + 1)],
+            text: Vec::new(),
             given: 0,
             ended: false,
         })

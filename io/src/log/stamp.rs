@@ -62,12 +62,24 @@ pub(super) fn parse(field: &str, order: DateOrder) -> Option<Stamp> {
     if !first.is_ascii_digit() {
         return None;
     }
+    // Most fields are plain numbers: a look at their marks saves trying every form.
+    let marks =
+        field.bytes().filter(|b| matches!(b, b':' | b'/' | b'-' | b' ' | b'T' | b'_' | 0x80..)).count();
+    if marks == 0 && field.bytes().filter(|b| *b == b'.').count() < 2 {
+        return if field.len() >= 8 { compact(field) } else { None };
+    }
     if field.contains('年') {
-        let plain = field.replace(['年', '月'], "-").replace('日', " ").replace(['时', '時', '分'], ":").replace('秒', "");
+        let plain = field
+            .replace(['年', '月'], "-")
+            .replace('日', " ")
+            .replace(['时', '時', '分'], ":")
+            .replace('秒', "");
         return parse(plain.trim(), order);
     }
     let comma = || field.find(", ").filter(|&i| i >= 6);
-    let cut = comma().or_else(|| field.find(['T', ' ', '\t']).filter(|&i| i >= 6)).or_else(|| joined_by_hyphen(field));
+    let cut = comma()
+        .or_else(|| field.find(['T', ' ', '\t']).filter(|&i| i >= 6))
+        .or_else(|| joined_by_hyphen(field));
     let (date, clock) = match cut {
         Some(i) => (&field[..i], field[i + 1..].trim_start()),
         None => (field, ""),
@@ -144,6 +156,9 @@ fn joined_by_hyphen(field: &str) -> Option<usize> {
 
 /// `Jun 28, 2024 2:35:00 PM` and `Fri Jun 28 14:35:00 2024`, with or without a zone's letters ahead of the year.
 fn spelled(field: &str) -> Option<Stamp> {
+    if field.len() < 10 || !field.contains(' ') || !field.ends_with(|c: char| c.is_ascii_alphanumeric()) {
+        return None;
+    }
     let mut words: Vec<&str> = field.split([' ', ',']).filter(|w| !w.is_empty()).collect();
     if words.first().is_some_and(|w| month(w).is_none()) {
         words.remove(0);
@@ -163,7 +178,11 @@ fn spelled(field: &str) -> Option<Stamp> {
 /// 20240628, 20240628T143500, 20240628143500.123 and the like.
 fn compact(field: &str) -> Option<Stamp> {
     let (whole, decimals) = field.split_once(['.', ',']).unwrap_or((field, ""));
-    let digits: String = whole.trim_end_matches('Z').chars().filter(|c| !matches!(c, 'T' | '-' | ' ' | '_')).collect();
+    if whole.len() < 8 {
+        return None;
+    }
+    let digits: String =
+        whole.trim_end_matches('Z').chars().filter(|c| !matches!(c, 'T' | '-' | ' ' | '_')).collect();
     if !digits.bytes().all(|b| b.is_ascii_digit()) || !matches!(digits.len(), 8 | 12 | 14) {
         return None;
     }
@@ -189,7 +208,9 @@ fn clock_s(text: &str) -> Option<(f64, Option<f64>)> {
     let (clock, afternoon) = ["pm", "p.m."]
         .iter()
         .find_map(|end| clock.strip_suffix(end).map(|c| (c.trim_end(), Some(true))))
-        .or_else(|| ["am", "a.m."].iter().find_map(|end| clock.strip_suffix(end).map(|c| (c.trim_end(), Some(false)))))
+        .or_else(|| {
+            ["am", "a.m."].iter().find_map(|end| clock.strip_suffix(end).map(|c| (c.trim_end(), Some(false))))
+        })
         .unwrap_or((clock, None));
     let mut parts = clock.split(':');
     let (first, second) = (parts.next()?, parts.next()?);

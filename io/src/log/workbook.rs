@@ -107,7 +107,11 @@ fn date_text(stamp: &ExcelDateTime) -> String {
     if stamp.is_duration() || days < 1.0 {
         let millis = (days * DAY_S * 1000.0).round() as u64;
         let (h, m, s) = (millis / 3_600_000, millis / 60_000 % 60, millis / 1000 % 60);
-        return if h < 24 { format!("{h:02}:{m:02}:{s:02}.{:03}", millis % 1000) } else { (days * DAY_S).to_string() };
+        return if h < 24 {
+            format!("{h:02}:{m:02}:{s:02}.{:03}", millis % 1000)
+        } else {
+            (days * DAY_S).to_string()
+        };
     }
     iso((days - EPOCH_DAYS) * DAY_S)
 }

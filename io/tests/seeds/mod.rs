@@ -51,7 +51,12 @@ pub fn log_seeds() -> Vec<Seed> {
         vec![stamp, comma(point(k, 0.0)), "50,0".to_owned(), comma(point(k, 2.0)), mode(k)]
     });
     let tabs = Seed::new(&["Date", "Clock", "PV", "MV"], "\t", |k| {
-        vec!["2024/06/28".to_owned(), format!("14:35:{k:02}.250"), point(k, 0.0), format!("{:e}", wave(k, 1.0))]
+        vec![
+            "2024/06/28".to_owned(),
+            format!("14:35:{k:02}.250"),
+            point(k, 0.0),
+            format!("{:e}", wave(k, 1.0)),
+        ]
     });
     let epoch = Seed::new(&["timestamp", "TT1", "Q1"], "|", |k| {
         vec![format!("{}", 1_719_585_300 + 10 * k), point(k, 0.0), point(k, 1.0)]
