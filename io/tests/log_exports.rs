@@ -266,6 +266,9 @@ fn spreadsheets_of_germany_and_brazil() {
     let log = import(&brazilian);
     assert_eq!(roles(&log)[..3], [Some("Nível"), Some("Referência"), Some("Vazão")]);
     starts(&log, "2024-06-28T14:35:00");
+    let told = rows("sep=;\nZeit;Druck\n", 20, |k| format!("{k},0;1.0{:02},5", k));
+    assert_eq!(names(&import(&told)), ["Druck"]);
+    assert_eq!(column(&import(&told), "Druck")[3], 1003.5);
     let serials = rows("Tempo;Nível\n", 20, |k| {
         format!("{};{:.0}", format!("{:.9}", 45471.5 + k as f64 / 86_400.0).replace('.', ","), pv(k))
     });

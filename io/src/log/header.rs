@@ -114,7 +114,7 @@ fn header_fields(line: &str, layout: &Layout, nearest: bool) -> Option<Vec<Strin
             && fields.chunks(2).all(|pair| pair.iter().any(|f| !f.is_empty()));
         let units = is_unit_row(&fields.iter().map(|f| (*f).to_owned()).collect::<Vec<_>>());
         if fields.len() >= layout.fields
-            && (filled.len() + 1 >= layout.used.len() || in_pairs || units)
+            && (filled.len() + 1 >= layout.used.len() && (nearest || filled.len() > 1) || in_pairs || units)
             && fields.len() <= layout.fields + 1
         {
             return Some(layout.used.iter().map(|&i| fields[i].to_owned()).collect());

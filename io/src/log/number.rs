@@ -126,6 +126,12 @@ fn long(text: &[u8], mark: u8) -> Option<f64> {
 }
 
 fn slow(field: &str, decimal: Decimal) -> Option<f64> {
+    // Spaces of any width group thousands; a typographer's minus is one.
+    if field.contains(|c: char| matches!(c, ' ' | '\u{a0}' | '\u{202f}' | '\u{2212}')) {
+        let spaces = [' ', '\u{a0}', '\u{202f}'];
+        let plain = field.trim_end_matches('%').trim_end().replace('\u{2212}', "-").replace(spaces, "'");
+        return slow(&plain, decimal);
+    }
     let field = field.strip_suffix('%').map_or(field, str::trim_end);
     let sign_ok = |b| matches!(b, b'+' | b'-' | b'.' | b',' | b'e' | b'E' | b'd' | b'D' | b'\'');
     if !field.bytes().all(|b| b.is_ascii_digit() || sign_ok(b)) {
@@ -209,6 +215,11 @@ mod tests {
             ("1.5", Decimal::Comma, None),
             ("1.2.3", Decimal::Point, None),
             ("40 %", Decimal::Point, Some(40.0)),
+            ("1 234,5", Decimal::Comma, Some(1234.5)),
+            ("\u{2212}7.5", Decimal::Point, Some(-7.5)),
+            ("1 2,5", Decimal::Comma, None),
+            ("1 2", Decimal::Point, None),
+            ("10 000", Decimal::Point, None),
             ("1.5D-3", Decimal::Point, Some(1.5e-3)),
             ("1e999", Decimal::Point, None),
             ("nan", Decimal::Point, None),
