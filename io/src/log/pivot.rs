@@ -228,7 +228,7 @@ fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
     let mut words: Vec<usize> = Vec::new();
     let mut strays = values.strays.iter().peekable();
     for row in 0..read.lines.len() {
-        let word = strays.next_if(|(at, _)| *at as usize == row).map(|(_, word)| *word);
+        let word = strays.next_if(|(at, _)| *at as usize == row).is_some();
         let tag = tags.values[row];
         if !tag.is_finite() {
             continue;
@@ -248,22 +248,16 @@ fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
             words.push(0);
             series.len() - 1
         });
-        words[at] += usize::from(word.is_some());
+        words[at] += usize::from(word);
         let is_good = good.is_none_or(|g| g[row]);
-        // A word is kept as its negative index until it is known whether the signal is one of words.
-        let value = match word {
-            Some(word) => -f64::from(word) - 1.0,
-            None => values.values[row],
-        };
+        // A word stands for a value until it is known whether its signal is one of words.
+        let value = if word { 0.0 } else { values.values[row] };
         let point = Point {
             time_s: time_s(row),
             value: if is_good { value } else { f64::NAN },
             line: read.lines[row],
         };
         series[at].points.push(point);
-        if word.is_some() {
-            series[at].states.push(String::new());
-        }
     }
     settle_words(read, long, &mut series, &words);
     series
@@ -278,7 +272,6 @@ fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]
     let stray_lines: HashMap<u32, u32> =
         values.strays.iter().map(|(row, word)| (read.lines[*row as usize], *word)).collect();
     for (signal, &count) in series.iter_mut().zip(words) {
-        signal.states.clear();
         let of_words = count * 2 > signal.points.len();
         for point in signal.points.iter_mut() {
             let word = stray_lines.get(&point.line).filter(|_| point.value.is_finite());
