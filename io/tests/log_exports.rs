@@ -92,6 +92,8 @@ fn long_exports_of_historians() {
     assert_eq!(mode.states, ["AUTO", "MAN"]);
     assert_eq!(mode.values[39], 1.0);
     assert_eq!(roles(&log)[3], Some("21TC105.MODE"));
+    let missing = |r: &Repair| matches!(r, Repair::MissingValues { .. });
+    assert!(!log.report.repairs.iter().any(missing), "{:?}", log.report.repairs);
     assert_eq!(log.table.len(), 40, "{:?}", log.report.repairs);
     starts(&log, "2024-06-28T14:00:00");
     // Without a header: tags that come again beside one number.

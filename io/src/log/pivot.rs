@@ -192,7 +192,8 @@ pub(super) fn turn(mut read: Read, long: &Long, repairs: &mut Vec<Repair>) -> Re
     let good = long.quality.map(|q| good_rows(&read.columns[q]));
     let bad: Vec<usize> = good.iter().flat_map(|g| (0..rows).filter(|&r| !g[r])).collect();
     let quality_name = long.quality.map(|q| read.columns[q].name.clone()).unwrap_or_default();
-    let mut series = by_name(&read, long, good.as_deref());
+    let (mut series, states) = by_name(&read, long, good.as_deref());
+    take_back(&read.columns[long.value].name, states, repairs);
     let service = |name: &str| name.starts_with("$RT_");
     for signal in series.iter().filter(|s| service(&s.name)) {
         let line = signal.points.first().map_or(0, |p| p.line as usize);
@@ -219,8 +220,8 @@ pub(super) fn turn(mut read: Read, long: &Long, repairs: &mut Vec<Repair>) -> Re
     Read { columns, lines: merged.lines, stated_sample_time_s: None }
 }
 
-/// The rows of each name, in the order in which the names come.
-fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
+/// The rows of each name, in the order in which the names come, and how many words among them are states.
+fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> (Vec<Series>, usize) {
     let (tags, values) = (&read.columns[long.tag], &read.columns[long.value]);
     let time_s = |row: usize| long.time.iter().map(|&i| read.columns[i].values[row]).sum::<f64>();
     let mut order: HashMap<u64, usize> = HashMap::new();
@@ -259,15 +260,30 @@ fn by_name(read: &Read, long: &Long, good: Option<&[bool]>) -> Vec<Series> {
         };
         series[at].points.push(point);
     }
-    settle_words(read, long, &mut series, &words);
-    series
+    let states = settle_words(read, long, &mut series, &words);
+    (series, states)
 }
 
-/// Signals whose values are mostly words become states; words among numbers become missing values.
-fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]) {
+/// Words that turned out to be states are no missing values.
+fn take_back(value_column: &str, states: usize, repairs: &mut Vec<Repair>) {
+    for repair in repairs.iter_mut() {
+        if let Repair::MissingValues { column, count, text, .. } = repair
+            && column == value_column
+            && !text.is_empty()
+        {
+            *count -= states.min(*count);
+        }
+    }
+    repairs.retain(|r| !matches!(r, Repair::MissingValues { count: 0, .. }));
+}
+
+/// Signals whose values are mostly words become states; words among numbers become missing values. Gives how many words
+/// became states.
+fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]) -> usize {
     let values = &read.columns[long.value];
+    let mut states = 0;
     if values.strays.is_empty() {
-        return;
+        return states;
     }
     let stray_lines: HashMap<u32, u32> =
         values.strays.iter().map(|(row, word)| (read.lines[*row as usize], *word)).collect();
@@ -277,6 +293,7 @@ fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]
             let word = stray_lines.get(&point.line).filter(|_| point.value.is_finite());
             point.value = match (of_words, word) {
                 (true, Some(&word)) => {
+                    states += 1;
                     let word = &values.states[word as usize];
                     let known = signal.states.iter().position(|s| s == word).unwrap_or_else(|| {
                         signal.states.push(word.clone());
@@ -289,6 +306,7 @@ fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]
             };
         }
     }
+    states
 }
 
 /// Which rows a column of qualities calls good.
