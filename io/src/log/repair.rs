@@ -235,6 +235,7 @@ pub enum Repair {
 }
 
 impl std::fmt::Display for Repair {
+    #[allow(clippy::too_many_lines, reason = "a sentence for each kind, and nothing else")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::MissingValues { column, count, line, text } => {
