@@ -6,7 +6,8 @@ use logs::{for_each_log, read_log, skip};
 use vasos_engine::explain::Explain;
 use vasos_engine::signal::{LogStart, derived_column};
 use vasos_io::log::{
-    Decimal, Encoding, ImportError, ImportOptions, ImportedLog, Repair, Separator, TimeKind, import_log,
+    Decimal, Encoding, ImportError, ImportOptions, ImportedLog, Repair, Separator, TextFormat, TimeKind,
+    import_log,
 };
 
 fn import(text: &str) -> ImportedLog {
@@ -15,6 +16,11 @@ fn import(text: &str) -> ImportedLog {
 
 fn import_bytes(bytes: &[u8]) -> ImportedLog {
     import_log("test", bytes, &ImportOptions::default()).expect("a log")
+}
+
+/// How a log that came from text is written.
+fn written(log: &ImportedLog) -> TextFormat {
+    log.report.text().expect("a text")
 }
 
 fn refused(bytes: &[u8]) -> ImportError {
@@ -45,8 +51,8 @@ fn reads_any_separator() {
         let text = log(&["time", "pv", "mv"].join(mark), 0, |_| String::new())
             + &log("", 20, |k| [format!("{k}.0"), format!("2{k}.5"), format!("-{k}e1")].join(mark));
         let log = import(&text);
-        assert_eq!(log.report.separator, separator);
-        assert_eq!(log.report.decimal, Decimal::Point);
+        assert_eq!(written(&log).separator, separator);
+        assert_eq!(written(&log).decimal, Decimal::Point);
         assert_eq!(log.report.header_line, Some(1), "{mark}");
         assert_eq!(column(&log, "pv")[..2], [20.5, 21.5]);
         assert_eq!(column(&log, "mv")[3], -30.0);
@@ -60,7 +66,7 @@ fn reads_decimal_commas_and_engineering_exponents() {
         let text =
             log("", 12, |k| [format!("{},000000E-3", 100 * k), format!("10,{k}"), "7".to_owned()].join(mark));
         let log = import(&text);
-        assert_eq!(log.report.decimal, Decimal::Comma);
+        assert_eq!(written(&log).decimal, Decimal::Comma);
         assert!((log.table.time_s[11] - 1.1).abs() < 1e-12);
         assert_eq!(column(&log, "column 2")[3], 10.3);
     }
@@ -72,7 +78,7 @@ fn a_header_may_use_another_separator_than_the_data() {
         format!("{k},0\t10,1\t{k},5")
     });
     let log = import(&text);
-    assert_eq!(log.report.separator, Separator::Tab);
+    assert_eq!(written(&log).separator, Separator::Tab);
     let names: Vec<_> = log.table.columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref())).collect();
     assert_eq!(names, [("setpoint level", Some("cm")), ("command PI (du)", Some("ml.s^-1"))]);
     assert_eq!(log.report.time_column.as_deref(), Some("t"));
@@ -113,14 +119,14 @@ fn reads_marks_and_character_sets() {
         [(utf8, Encoding::Utf8), (utf16, Encoding::Utf16), (latin, Encoding::Windows1252)]
     {
         let log = import_bytes(&bytes);
-        assert_eq!(log.report.encoding, encoding);
+        assert_eq!(written(&log).encoding, encoding);
         assert_eq!(column(&log, "nível"), [1.5, 2.5, 3.5]);
         assert_eq!(log.report.roles.pv.as_deref(), Some("nível"));
     }
     let mut chinese = b"\xCA\xB1\xBC\xE4,\xCE\xC2\xB6\xC8\n".to_vec();
     chinese.extend(b"0,1\n1,2\n2,3\n");
     let log = import_bytes(&chinese);
-    assert_eq!(log.report.encoding, Encoding::Gb18030);
+    assert_eq!(written(&log).encoding, Encoding::Gb18030);
     assert_eq!(column(&log, "温度"), [1.0, 2.0, 3.0]);
 }
 

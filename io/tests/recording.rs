@@ -12,6 +12,7 @@ use skip::skip;
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::{Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::signal::ChannelKind;
+use vasos_io::log::{FileFormat, ImportOptions, open_log};
 use vasos_io::recording::{
     RecordedColumn, Recording, RecordingError, RecordingOptions, RecordingTrouble, read_recording,
 };
@@ -289,4 +290,29 @@ fn a_viewer_that_joins_and_is_killed_costs_no_row() {
     println!("closed in {closing:?} with a viewer that stands still");
     assert_eq!(lost, 0);
     assert_eq!(loop_of(&read_recording(&path).expect("reads")).time_s.len() as u64, rows);
+}
+
+#[test]
+fn a_recording_opens_as_a_log() {
+    let folder = folder();
+    let path = folder.path().join("run.rrd");
+    let session = session("stad", 200.0);
+    let recording = record(&session, &path, FILE_ONLY);
+    std::thread::sleep(Duration::from_millis(500));
+    end(&session, recording);
+    let columns = read_recording(&path).expect("reads");
+    let recorded = loop_of(&columns);
+    let log = open_log(&path, &ImportOptions::default()).expect("a log");
+    assert_eq!(log.report.format, FileFormat::Recording);
+    assert_eq!(log.table.len(), recorded.time_s.len(), "{:?}", log.report.repairs);
+    let pv = log.table.column("loop_1.pv").expect("a PV");
+    assert_eq!(pv.unit.as_deref(), Some("cm"));
+    for (row, values) in recorded.values.iter().enumerate() {
+        assert!(pv.values[row] == values[1] || (pv.values[row].is_nan() && values[1].is_nan()));
+        let time_s = recorded.time_s[row] - recorded.time_s[0];
+        assert!((log.table.time_s[row] - time_s).abs() < 1e-9);
+    }
+    let roles = &log.report.roles;
+    assert_eq!(roles.mv.as_deref(), Some("loop_1.mv"));
+    assert_eq!(roles.sp.as_deref(), Some("loop_1.sp"));
 }

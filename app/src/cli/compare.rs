@@ -10,10 +10,10 @@ use vasos_engine::signal::{ChannelKind, ChannelSet, derived_column};
 use vasos_engine::sim::{
     Comparison, InputSeries, ModelKind, ModelTrace, Scenario, run_scenario, scenario_start,
 };
-use vasos_io::log::{ImportOptions, import_log};
 use vasos_io::rig::load_scenario;
 
 use super::json::{self, shown, table};
+use super::logs::Reading;
 use super::{Answer, Refusal, point};
 
 /// Arguments of `vasos compare`.
@@ -157,11 +157,7 @@ fn simulated(
 }
 
 fn recorded(arguments: &Arguments, path: &Path, network: &Network, tank: usize) -> Result<Record, Refusal> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let log = import_log(&name, &bytes, &ImportOptions { sample_time_s: None, time_column: None })
-        .map_err(|error| Refusal(format!("{}: {error}", path.display())))?;
+    let log = Reading::default().open(&[path])?;
     let channels = ChannelSet::of(network);
     let usual = |kind| channels.column(kind).map_or_else(String::new, |i| channels.channels[i].name.clone());
     let mut columns = Vec::new();

@@ -9,11 +9,11 @@ use vasos_engine::identify::grey_box::{
 };
 use vasos_engine::plant::Network;
 use vasos_engine::signal::derived_column;
-use vasos_io::log::{ImportOptions, import_log};
 use vasos_io::rig::{load_rig, rig_text};
 use vasos_io::rig_fitted::fitted_rig;
 
 use super::json::{shown, table};
+use super::logs::Reading;
 use super::{Answer, Refusal};
 
 /// Arguments of `vasos fit-plant`.
@@ -34,7 +34,7 @@ JSON: {parameters, interval_95, rmse_train, rmse_validate, initial_samples, stan
 pub struct Arguments {
     /// Preset or rig file (TOML).
     rig: String,
-    /// Recording to fit: CSV, TSV or the like.
+    /// Recording to fit: text with separators, a workbook, Parquet or a recording.
     log: PathBuf,
     /// Another recording, to judge the fit by.
     #[arg(long, value_name = "LOG")]
@@ -51,12 +51,8 @@ pub struct Arguments {
     /// Configuration of the rig; otherwise its first.
     #[arg(long, value_name = "ID")]
     configuration: Option<String>,
-    /// Time column, where the proposal is wrong.
-    #[arg(long, value_name = "COL")]
-    time: Option<String>,
-    /// Sample time in seconds, for logs without a time column.
-    #[arg(long, value_name = "S")]
-    sample_time: Option<f64>,
+    #[command(flatten)]
+    reading: Reading,
     /// Rig file to write with the fitted values in place; an existing file is replaced.
     #[arg(short = 'o', long = "fitted", value_name = "FILE")]
     fitted: Option<PathBuf>,
@@ -124,12 +120,7 @@ fn free(network: &Network, configuration: usize, given: &[String]) -> Result<Vec
 
 /// The named columns of a log.
 fn record(arguments: &Arguments, network: &Network, path: &Path) -> Result<GreyBoxRecord, Refusal> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let options = ImportOptions { sample_time_s: arguments.sample_time, time_column: arguments.time.clone() };
-    let log = import_log(&name, &bytes, &options)
-        .map_err(|error| Refusal(format!("{}: {error}", path.display())))?;
+    let log = arguments.reading.open(&[path])?;
     let column = |text: &str, option: &str| -> Result<(String, Vec<f64>), Refusal> {
         let (name, column) =
             text.split_once('=').ok_or_else(|| Refusal(format!("--{option} '{text}': write NAME=COLUMN")))?;

@@ -12,6 +12,7 @@ mod experiment;
 mod fit_plant;
 mod identify;
 mod json;
+mod logs;
 mod model;
 mod optimal;
 pub mod parse;
@@ -37,6 +38,7 @@ Examples:
   vasos model stad --at LIC-02=19
   vasos excite stad --loop LIC-02 --relay 0.3
   vasos compare run.toml --recording run.csv --column h2_cm
+  vasos log export.xlsx
   vasos identify step.csv --pv h2 --mv u --json
   vasos fit-plant stad log.csv --input u=u_v --output h3=h3_cm --fit FV03.k90=20..150
   vasos tune --model K=4.9,T=152,L=2 --rule amigo --controller pi
@@ -67,6 +69,8 @@ pub enum Command {
     Excite(Box<excite::Arguments>),
     /// Run models side by side on one input, against a recording.
     Compare(compare::Arguments),
+    /// Say what is in log files: columns, units, time axis, what was repaired, and which columns are proposed.
+    Log(logs::Arguments),
     /// Fit a process model to a log.
     Identify(identify::Arguments),
     /// Fit parameters of a rig to a recording: the tank network's own laws, simulated in free run.
@@ -160,6 +164,7 @@ pub fn run(cli: Cli) -> CliOutcome {
         Command::Model(arguments) => model::run(arguments),
         Command::Excite(arguments) => excite::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
+        Command::Log(arguments) => logs::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::FitPlant(arguments) => fit_plant::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),

@@ -7,7 +7,7 @@ use eframe::egui;
 use vasos_engine::document::{DocumentCommand, LogRoles};
 use vasos_engine::experiment::ExperimentEnd;
 use vasos_io::experiment::load_experiment;
-use vasos_io::log::{ImportOptions, ImportedLog, import_log};
+use vasos_io::log::{DateOrder, ImportError, ImportOptions, ImportedLog, Repair, open_log};
 use vasos_io::rig::{FileError, load_rig};
 
 use super::Workbench;
@@ -26,11 +26,13 @@ pub struct ImportSheet {
     log: ImportedLog,
     roles: LogRoles,
     sample_time_s: f64,
+    /// What the user said of the file so far.
+    options: ImportOptions,
 }
 
 impl ImportSheet {
     /// A sheet with the columns the importer proposes.
-    pub fn new(path: PathBuf, log: ImportedLog) -> Self {
+    pub fn new(path: PathBuf, log: ImportedLog, options: ImportOptions) -> Self {
         let proposed = &log.report.roles;
         let index = |name: &Option<String>| name.as_deref().and_then(|n| log.table.index_of(n));
         let roles = LogRoles {
@@ -40,7 +42,8 @@ impl ImportSheet {
             mode: index(&proposed.mode),
             disturbance: None,
         };
-        Self { path, log, roles, sample_time_s: 1.0 }
+        let sample_time_s = options.sample_time_s.unwrap_or(1.0);
+        Self { path, log, roles, sample_time_s, options }
     }
 }
 
@@ -65,15 +68,11 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
         let reason = tr!("window.is_folder");
         return Outcome::Failed(Box::new(FileError::Read { path: shown, reason }));
     }
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            return Outcome::Failed(Box::new(FileError::Read { path: shown, reason: error.to_string() }));
+    match open_log(path, options) {
+        Ok(log) => Outcome::Log(path.to_owned(), Box::new(log), options.clone()),
+        Err(ImportError::Read { reason }) => {
+            Outcome::Failed(Box::new(FileError::Read { path: shown, reason }))
         }
-    };
-    let name = path.file_name().map_or(shown, |n| n.to_string_lossy().into_owned());
-    match import_log(&name, &bytes, options) {
-        Ok(log) => Outcome::Log(path.to_owned(), Box::new(log)),
         Err(error) => Outcome::Failed(Box::new(error)),
     }
 }
@@ -111,10 +110,10 @@ impl Workbench {
     pub(super) fn take_results(&mut self, ctx: &egui::Context) {
         for outcome in self.jobs.results().into_iter().chain(self.beside.results()) {
             match outcome {
-                Outcome::Log(path, log) => {
+                Outcome::Log(path, log, options) => {
                     let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
                     self.tell(Weight::Note, words);
-                    self.import = Some(ImportSheet::new(path, *log));
+                    self.import = Some(ImportSheet::new(path, *log, options));
                 }
                 Outcome::Rig(path, network) => {
                     self.settings.remember(path);
@@ -184,9 +183,7 @@ impl Workbench {
                 self.tell(Weight::Note, tr!("import_sheet.cancelled", name = sheet.log.table.name))
             }
             Answer::ReadAgain => {
-                let options =
-                    ImportOptions { sample_time_s: Some(sheet.sample_time_s), ..ImportOptions::default() };
-                let path = sheet.path.clone();
+                let (path, options) = (sheet.path.clone(), sheet.options.clone());
                 self.jobs.start("import", move || read(&path, &options));
             }
         }
@@ -214,7 +211,11 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
             for (what, role) in [("PV", &mut roles.pv), ("SP", &mut roles.sp), ("MV", &mut roles.mv)] {
                 column_choice(ui, what, role, &log.table, 130.0);
             }
+            column_choice(ui, &tr!("import_sheet.mode"), &mut roles.mode, &log.table, 130.0);
         });
+        if time_ui(ui, sheet) {
+            answer = Answer::ReadAgain;
+        }
         if sheet.log.report.time_column.is_none() {
             ui.horizontal(|ui| {
                 let name = ui.label(tr!("import_sheet.sample_time"));
@@ -222,6 +223,7 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
                     egui::DragValue::new(&mut sheet.sample_time_s).range(1e-6..=1e6).speed(0.01).suffix(" s");
                 ui.add(field).labelled_by(name.id);
                 if ui.button(tr!("import_sheet.again")).clicked() {
+                    sheet.options.sample_time_s = Some(sheet.sample_time_s);
                     answer = Answer::ReadAgain;
                 }
             });
@@ -258,6 +260,37 @@ fn sheet_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> Answer {
     // A click beside the sheet must not throw away what was read.
     let escaped = modal.is_top_modal && ui.input(|i| i.key_pressed(egui::Key::Escape));
     if escaped && matches!(answer, Answer::None) { Answer::Cancel } else { answer }
+}
+
+/// What the user may change about the time: its column, and the order of day and month where dates read both ways. True
+/// when the file is to be read again.
+fn time_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> bool {
+    let before = sheet.options.clone();
+    let current = sheet.log.report.time_column.clone();
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label(tr!("import_sheet.time_column"));
+        let mut chosen = current.clone();
+        egui::ComboBox::from_id_salt("time_column")
+            .width(130.0)
+            .truncate()
+            .selected_text(current.clone().unwrap_or_else(|| tr!("import_sheet.none")))
+            .show_ui(ui, |ui| {
+                let numbers = sheet.log.table.columns.iter().filter(|c| c.states.is_empty());
+                for name in current.iter().chain(numbers.map(|c| &c.name)) {
+                    ui.selectable_value(&mut chosen, Some(name.clone()), name);
+                }
+            })
+            .response
+            .labelled_by(label.id);
+        if chosen != current {
+            sheet.options.time_column = chosen;
+        }
+        let doubtful = sheet.log.report.repairs.contains(&Repair::AmbiguousDates);
+        if doubtful && ui.button(tr!("import_sheet.month_first")).clicked() {
+            sheet.options.date_order = Some(DateOrder::MonthFirst);
+        }
+    });
+    sheet.options != before
 }
 
 fn facts(ui: &mut egui::Ui, sheet: &ImportSheet) {

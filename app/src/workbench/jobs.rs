@@ -10,7 +10,7 @@ use vasos_engine::document::NewModel;
 use vasos_engine::experiment::Experiment;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::Network;
-use vasos_io::log::ImportedLog;
+use vasos_io::log::{ImportOptions, ImportedLog};
 
 use crate::answers::{Question, Reply};
 use crate::experiments::Finished;
@@ -24,7 +24,7 @@ pub type Said = Box<dyn Explain + Send>;
 /// What a job came to.
 pub enum Outcome {
     /// A log was read.
-    Log(PathBuf, Box<ImportedLog>),
+    Log(PathBuf, Box<ImportedLog>, ImportOptions),
     /// A rig was read.
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.

@@ -2,17 +2,19 @@
 
 use vasos_engine::signal::LogStart;
 
-use super::rows::{Kind, Read};
-use super::stamp::iso;
+use super::calendar::{days_from_civil, iso};
+use super::order::{ordered, typical_step};
+use super::read::{Kind, Read};
+use super::stamp::DAY_S;
 use super::{ImportError, ImportOptions, Repair, TimeKind};
 
-const DAY_S: f64 = 86_400.0;
-/// 1970-01-01 as a spreadsheet counts days.
+/// 1970-01-01 as a spreadsheet counts days, and as MATLAB does.
 const EXCEL_1970: f64 = 25_569.0;
+const MATLAB_1970: f64 = 719_529.0;
+/// 1970-01-01 as LabVIEW counts seconds.
+const LABVIEW_1970_S: f64 = 2_082_844_800.0;
 /// A nameless column needs this many rows to pass for a clock.
 const FEWEST_TICKS: usize = 8;
-/// A share of repeated stamps above this means stamps coarser than the sampling.
-const COARSE_STAMPS: f64 = 0.25;
 
 /// The time axis of a log.
 #[derive(Debug)]
@@ -22,69 +24,79 @@ pub(super) struct Axis {
     pub kind: TimeKind,
     /// Columns the time was made of.
     pub columns: Vec<usize>,
+    /// Seconds the stamps' zone is ahead of UTC.
+    pub zone_s: Option<f64>,
     /// Rows kept, when not all are.
-    pub keep: Option<Vec<usize>>,
+    pub keep: Option<Vec<u32>>,
 }
 
-/// Finds and puts in order the time axis.
+/// Finds and puts in order the time axis. The values of its columns are taken out of `read`.
 ///
 /// # Errors
 /// [`ImportError::NoSuchTimeColumn`] for a column the user named that is not there; [`ImportError::TimeStandsStill`]
 /// where the time column holds one value, and no sample time was given.
 pub(super) fn find(
-    read: &Read,
+    read: &mut Read,
     options: &ImportOptions,
     repairs: &mut Vec<Repair>,
 ) -> Result<Axis, ImportError> {
     let columns = match &options.time_column {
-        Some(name) => {
-            let at = read.names.iter().position(|n| n == name);
-            let columns = || read.names.join(", ");
-            vec![at.ok_or_else(|| ImportError::NoSuchTimeColumn { name: name.clone(), columns: columns() })?]
-        }
+        Some(name) => vec![named(read, name)?],
         None => choose(read),
     };
     // A PV that rises evenly passes for a clock; a column named as one goes before.
     let by_behaviour = options.time_column.is_none()
         && columns
             .first()
-            .is_none_or(|&i| read.columns[i].kind == Kind::Number && !is_time_name(&read.names[i]));
+            .is_none_or(|&i| read.columns[i].kind == Kind::Number && !is_time_name(&read.columns[i].name));
     let still = by_behaviour.then(|| still_clock(read)).flatten().or_else(|| {
         let first = *columns.first()?;
         (columns.len() == 1 && stands_still(&read.columns[first].values)).then_some(first)
     });
     if let (Some(column), None) = (still, options.sample_time_s) {
         return Err(ImportError::TimeStandsStill {
-            name: read.names[column].clone(),
+            name: read.columns[column].name.clone(),
             rows: read.lines.len(),
         });
     }
     let columns = if still.is_some() { Vec::new() } else { columns };
-    let Some(&first) = columns.first() else {
-        let sample_time_s = options.sample_time_s.filter(|h| h.is_finite() && *h > 0.0);
-        let assumed = sample_time_s.is_none();
-        let sample_time_s = sample_time_s.unwrap_or(1.0);
-        if assumed {
-            repairs.push(Repair::NoTimeColumn { sample_time_s });
-        }
-        let time_s = (0..read.lines.len()).map(|k| k as f64 * sample_time_s).collect();
-        let kind = TimeKind::Missing { sample_time_s, assumed };
-        return Ok(Axis { time_s, start: LogStart::Unknown, kind, columns, keep: None });
-    };
+    let Some(&first) = columns.first() else { return Ok(counted(read, options, repairs)) };
+    let is_clock = read.columns[first].kind == Kind::Clock;
+    let zone_s = read.columns[first].zone_s;
     let (kind, raw) = seconds(read, &columns);
-    let (keep, mut time_s) = ordered(&raw, &read.lines, repairs);
+    let calendar = !is_clock && !matches!(kind, TimeKind::Numbers { .. });
+    let (keep, mut time_s) = ordered(raw, read, calendar, zone_s.is_some(), repairs);
     let start_s = time_s.first().copied().unwrap_or(0.0);
-    let start = match kind {
-        TimeKind::Stamps if read.columns[first].kind == Kind::Clock => LogStart::Seconds(start_s),
-        TimeKind::Stamps | TimeKind::ExcelSerials | TimeKind::Epoch => LogStart::Calendar(iso(start_s)),
-        TimeKind::Numbers { .. } | TimeKind::Missing { .. } => LogStart::Seconds(start_s),
+    let start = if calendar {
+        LogStart::Calendar(iso(start_s + zone_s.unwrap_or(0.0)))
+    } else {
+        LogStart::Seconds(start_s)
     };
     for t in &mut time_s {
         *t -= start_s;
     }
-    note_gaps(&time_s, &keep, &read.lines, repairs);
-    let all = keep.len() == raw.len();
-    Ok(Axis { time_s, start, kind, columns, keep: if all { None } else { Some(keep) } })
+    note_gaps(&time_s, keep.as_deref(), read, repairs);
+    Ok(Axis { time_s, start, kind, columns, zone_s, keep })
+}
+
+fn named(read: &Read, name: &str) -> Result<usize, ImportError> {
+    let at = read.columns.iter().position(|c| c.name == name);
+    at.ok_or_else(|| {
+        let columns: Vec<&str> = read.columns.iter().map(|c| c.name.as_str()).collect();
+        ImportError::NoSuchTimeColumn { name: name.to_owned(), columns: columns.join(", ") }
+    })
+}
+
+/// The axis of a file without time: rows at even distances.
+fn counted(read: &Read, options: &ImportOptions, repairs: &mut Vec<Repair>) -> Axis {
+    let given = options.sample_time_s.or(read.stated_sample_time_s).filter(|h| h.is_finite() && *h > 0.0);
+    let sample_time_s = given.unwrap_or(1.0);
+    if given.is_none() {
+        repairs.push(Repair::NoTimeColumn { sample_time_s });
+    }
+    let time_s = (0..read.lines.len()).map(|k| k as f64 * sample_time_s).collect();
+    let kind = TimeKind::Missing { sample_time_s, assumed: given.is_none() };
+    Axis { time_s, start: LogStart::Unknown, kind, columns: Vec::new(), zone_s: None, keep: None }
 }
 
 /// The time column, or a date and a time of day: stamps, else by name, else by behaviour.
@@ -96,16 +108,23 @@ fn choose(read: &Read) -> Vec<usize> {
     match (of_kind(Kind::Date), of_kind(Kind::Clock)) {
         (Some(date), Some(clock)) => return vec![date, clock],
         (None, Some(clock)) => return vec![clock],
-        (Some(date), None) if moves_on(&read.columns[date].values) => return vec![date],
+        (Some(date), None)
+            if moves_on(&read.columns[date].values) || falls_steadily(&read.columns[date].values) =>
+        {
+            return vec![date];
+        }
         _ => {}
     }
     let numbers = || (0..read.columns.len()).filter(|&i| read.columns[i].kind == Kind::Number);
-    let named = numbers().filter(|&i| is_time_name(&read.names[i]));
-    let ticking =
-        named.filter(|&i| moves_on(&read.columns[i].values) || mostly_moves_on(&read.columns[i].values));
+    let named = numbers().filter(|&i| is_time_name(&read.columns[i].name));
+    let ticking = named.filter(|&i| ticks(&read.columns[i].values));
     // A single letter may be a temperature: of several candidates the longer word, the steadier, the first.
     let rank = |&i: &usize| {
-        (read.names[i].chars().count() > 1, is_clocklike(&read.columns[i].values), std::cmp::Reverse(i))
+        (
+            read.columns[i].name.chars().count() > 1,
+            is_clocklike(&read.columns[i].values),
+            std::cmp::Reverse(i),
+        )
     };
     if let Some(named) = ticking.max_by_key(rank) {
         return vec![named];
@@ -124,7 +143,7 @@ fn choose(read: &Read) -> Vec<usize> {
 /// A column of numbers with the name of a time, a word and no letter, that never moves.
 fn still_clock(read: &Read) -> Option<usize> {
     (0..read.columns.len()).find(|&i| {
-        let named = is_time_name(&read.names[i]) && read.names[i].chars().count() > 1;
+        let named = is_time_name(&read.columns[i].name) && read.columns[i].name.chars().count() > 1;
         named && read.columns[i].kind == Kind::Number && stands_still(&read.columns[i].values)
     })
 }
@@ -133,8 +152,10 @@ fn stands_still(values: &[f64]) -> bool {
     values.len() > 1 && values.iter().all(|t| *t == values[0])
 }
 
-fn is_time_name(name: &str) -> bool {
-    const NAMES: [&str; 22] = [
+/// Whether a name is one of a time.
+pub(super) fn is_time_name(name: &str) -> bool {
+    const NAMES: [&str; 23] = [
+        "millis",
         "time",
         "t",
         "tempo",
@@ -160,7 +181,10 @@ fn is_time_name(name: &str) -> bool {
     ];
     let lower = name.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
-    words.next().is_some_and(|w| NAMES.contains(&w)) || lower.contains("time") || lower.contains("tempo (")
+    words.next().is_some_and(|w| NAMES.contains(&w))
+        || lower.contains("time")
+        || lower == "x_value"
+        || lower.contains("tempo (")
 }
 
 fn steps(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
@@ -178,18 +202,25 @@ fn mostly_moves_on(values: &[f64]) -> bool {
     forward * 2 > values.len().saturating_sub(1)
 }
 
+/// Backwards by nearly the same step, as in files with the newest row first.
+fn falls_steadily(values: &[f64]) -> bool {
+    let Some(typical) = typical_step(values).filter(|t| *t < 0.0) else { return false };
+    let near = steps(values).filter(|s| (3.0 * typical..=0.3 * typical).contains(s)).count();
+    near * 10 >= values.len().saturating_sub(1) * 9
+}
+
+/// Whether a column named like a time behaves like one.
+fn ticks(values: &[f64]) -> bool {
+    moves_on(values) || mostly_moves_on(values) || falls_steadily(values)
+}
+
 /// Nearly always rising, by nearly the same step.
 fn is_clocklike(values: &[f64]) -> bool {
     if values.len() < FEWEST_TICKS {
         return false;
     }
-    let mut sorted: Vec<f64> = steps(values).filter(|s| s.is_finite()).collect();
-    if sorted.is_empty() {
-        return false;
-    }
-    sorted.sort_by(f64::total_cmp);
-    let typical = sorted[sorted.len() / 2];
-    let near = sorted.iter().filter(|s| (0.3 * typical..=3.0 * typical).contains(*s)).count();
+    let Some(typical) = typical_step(values) else { return false };
+    let near = steps(values).filter(|s| (0.3 * typical..=3.0 * typical).contains(s)).count();
     typical > 0.0 && near * 100 >= values.len().saturating_sub(1) * 90
 }
 
@@ -199,24 +230,40 @@ fn is_row_number(values: &[f64]) -> bool {
 }
 
 /// The chosen columns in seconds.
-fn seconds(read: &Read, columns: &[usize]) -> (TimeKind, Vec<f64>) {
-    let first = &read.columns[columns[0]];
-    let mut raw = first.values.clone();
+fn seconds(read: &mut Read, columns: &[usize]) -> (TimeKind, Vec<f64>) {
+    let mut raw = std::mem::take(&mut read.columns[columns[0]].values);
     if let Some(&clock) = columns.get(1) {
         raw.iter_mut().zip(&read.columns[clock].values).for_each(|(t, s)| *t += s);
     }
-    match first.kind {
+    match read.columns[columns[0]].kind {
         Kind::Clock => {
             unwrap_midnights(&mut raw);
             (TimeKind::Stamps, raw)
         }
         Kind::Full | Kind::Date | Kind::Words => (TimeKind::Stamps, raw),
         Kind::Number => {
+            if raw.iter().all(|t| !t.is_finite() || from_digits(*t).is_some()) {
+                raw.iter_mut().for_each(|t| *t = from_digits(*t).unwrap_or(f64::NAN));
+                return (TimeKind::Stamps, raw);
+            }
             let (kind, unit_s, origin) = numeric_kind(&raw, &unit_of(read, columns[0]));
             raw.iter_mut().for_each(|t| *t = (*t - origin) * unit_s);
             (kind, raw)
         }
     }
+}
+
+/// A stamp written as one number: yyyymmddhhmmss.
+fn from_digits(number: f64) -> Option<f64> {
+    if !(1.9e13..2.2e13).contains(&number) || number.fract() != 0.0 {
+        return None;
+    }
+    let digits = number as i64;
+    let part = |unit: i64, size: i64| digits / unit % size;
+    let (y, month, d) = (part(10_000_000_000, 10_000), part(100_000_000, 100), part(1_000_000, 100));
+    let (h, m, s) = (part(10_000, 100), part(100, 100), part(1, 100));
+    let sane = (1..=12).contains(&month) && (1..=31).contains(&d) && h < 24 && m < 60 && s < 61;
+    sane.then(|| days_from_civil(y, month, d) as f64 * DAY_S + (h * 3600 + m * 60 + s) as f64)
 }
 
 fn unwrap_midnights(raw: &mut [f64]) {
@@ -232,23 +279,29 @@ fn unwrap_midnights(raw: &mut [f64]) {
 
 /// Name and unit of a column: either may say what it counts.
 fn unit_of(read: &Read, column: usize) -> String {
-    format!("{} {}", read.names[column], read.units[column].as_deref().unwrap_or(""))
+    format!("{} {}", read.columns[column].name, read.columns[column].unit.as_deref().unwrap_or(""))
 }
 
 /// Kind, seconds of a unit, and what to take off first.
 fn numeric_kind(raw: &[f64], name: &str) -> (TimeKind, f64, f64) {
     let first = raw.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
-    let mut sizes: Vec<f64> = steps(raw).filter(|s| *s > 0.0).take(1000).collect();
+    let mut sizes: Vec<f64> = steps(raw).map(f64::abs).filter(|s| *s > 0.0).take(1000).collect();
     sizes.sort_by(f64::total_cmp);
     let step = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
     if (20_000.0..80_000.0).contains(&first) && step < 0.5 {
         return (TimeKind::ExcelSerials, DAY_S, EXCEL_1970);
     }
-    if (1e9..1e10).contains(&first) {
-        return (TimeKind::Epoch, 1.0, 0.0);
+    if (700_000.0..800_000.0).contains(&first) && step < 0.5 {
+        return (TimeKind::MatlabDays, DAY_S, MATLAB_1970);
     }
-    if (1e12..1e13).contains(&first) {
-        return (TimeKind::Epoch, 1e-3, 0.0);
+    if (3.2e9..4.5e9).contains(&first) {
+        return (TimeKind::Epoch, 1.0, LABVIEW_1970_S);
+    }
+    // Seconds, milliseconds, microseconds and nanoseconds since 1970, from 2001 on.
+    for (seconds_at_least, unit_s) in [(1e9, 1.0), (1e12, 1e-3), (1e15, 1e-6), (1e18, 1e-9)] {
+        if (seconds_at_least..3.2 * seconds_at_least).contains(&first) {
+            return (TimeKind::Epoch, unit_s, 0.0);
+        }
     }
     let lower = name.to_lowercase();
     let has = |unit: &str| lower.split(|c: char| !c.is_alphanumeric()).any(|w| w == unit);
@@ -264,92 +317,14 @@ fn numeric_kind(raw: &[f64], name: &str) -> (TimeKind, f64, f64) {
     (TimeKind::Numbers { unit_s }, unit_s, 0.0)
 }
 
-/// Rows in order of time and their times: strays and repeats out, of several runs the longest.
-fn ordered(raw: &[f64], lines: &[u32], repairs: &mut Vec<Repair>) -> (Vec<usize>, Vec<f64>) {
-    let mut keep: Vec<usize> = (0..raw.len()).filter(|&k| raw[k].is_finite()).collect();
-    if keep.len() < raw.len() {
-        let line = (0..raw.len()).find(|&k| !raw[k].is_finite()).map_or(0, |k| lines[k] as usize);
-        repairs.push(Repair::NoTime { count: raw.len() - keep.len(), line });
-    }
-    drop_strays(raw, &mut keep, lines, repairs);
-    keep_longest_run(raw, &mut keep, lines, repairs);
-    let repeats = keep.windows(2).filter(|w| raw[w[1]] == raw[w[0]]).count();
-    if repeats == 0 {
-        let time_s = keep.iter().map(|&k| raw[k]).collect();
-        return (keep, time_s);
-    }
-    if repeats as f64 > COARSE_STAMPS * keep.len() as f64 {
-        repairs.push(Repair::SpreadStamps { count: repeats });
-        let time_s = spread(&keep.iter().map(|&k| raw[k]).collect::<Vec<_>>());
-        return (keep, time_s);
-    }
-    let first = keep.windows(2).find(|w| raw[w[1]] == raw[w[0]]).map_or(0, |w| lines[w[1]] as usize);
-    repairs.push(Repair::DuplicateStamps { count: repeats, line: first });
-    keep.dedup_by(|a, b| raw[*a] == raw[*b]);
-    let time_s = keep.iter().map(|&k| raw[k]).collect();
-    (keep, time_s)
-}
-
-/// Single rows whose stamp lies outside those of both neighbours.
-fn drop_strays(raw: &[f64], keep: &mut Vec<usize>, lines: &[u32], repairs: &mut Vec<Repair>) {
-    let mut strays = Vec::new();
-    let mut kept: Vec<usize> = Vec::with_capacity(keep.len());
-    for (i, &k) in keep.iter().enumerate() {
-        let before = kept.last().map(|&b| raw[b]);
-        let after = keep.get(i + 1).map(|&a| raw[a]);
-        let fits = |t: f64, next: Option<f64>| next.is_none_or(|n| n >= t);
-        let stray = match (before, after) {
-            // Too early, and the next row goes on from the one before.
-            (Some(b), Some(a)) if raw[k] < b => a >= b,
-            // Too late, and the next row goes on from the one before.
-            (Some(b), Some(a)) if raw[k] > a => a >= b && fits(a, keep.get(i + 2).map(|&n| raw[n])),
-            _ => false,
-        };
-        if stray { strays.push(lines[k] as usize) } else { kept.push(k) }
-    }
-    if let Some(&line) = strays.first() {
-        repairs.push(Repair::StrayStamps { count: strays.len(), line });
-        *keep = kept;
-    }
-}
-
-fn keep_longest_run(raw: &[f64], keep: &mut Vec<usize>, lines: &[u32], repairs: &mut Vec<Repair>) {
-    let Some(jump) = keep.windows(2).position(|w| raw[w[1]] < raw[w[0]]) else { return };
-    let (line, back_s) = (lines[keep[jump + 1]] as usize, raw[keep[jump]] - raw[keep[jump + 1]]);
-    let longest = keep.chunk_by(|&a, &b| raw[b] >= raw[a]).max_by_key(|run| run.len()).map(<[usize]>::to_vec);
-    if let Some(run) = longest {
-        let (from_line, to_line) = (lines[run[0]] as usize, lines[run[run.len() - 1]] as usize);
-        repairs.push(Repair::TimeRestart { line, back_s, from_line, to_line });
-        *keep = run;
-    }
-}
-
-/// Spreads rows of one stamp evenly up to the next stamp.
-fn spread(time_s: &[f64]) -> Vec<f64> {
-    let mut even = Vec::with_capacity(time_s.len());
-    let groups: Vec<&[f64]> = time_s.chunk_by(|a, b| a == b).collect();
-    for (i, group) in groups.iter().enumerate() {
-        let here = group[0];
-        let next = groups.get(i + 1).map(|g| g[0]);
-        let before = i.checked_sub(1).map(|b| groups[b][0]);
-        let width = next.map_or_else(|| before.map_or(1.0, |b| here - b), |n| n - here);
-        even.extend((0..group.len()).map(|j| here + width * j as f64 / group.len() as f64));
-    }
-    even
-}
-
-fn note_gaps(time_s: &[f64], keep: &[usize], lines: &[u32], repairs: &mut Vec<Repair>) {
-    let mut sizes: Vec<f64> = steps(time_s).collect();
-    if sizes.len() < 3 {
-        return;
-    }
-    let middle = sizes.len() / 2;
-    let typical = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+fn note_gaps(time_s: &[f64], keep: Option<&[u32]>, read: &Read, repairs: &mut Vec<Repair>) {
+    let Some(typical) = typical_step(time_s).filter(|_| time_s.len() > 3) else { return };
     let gap = |s: f64| s > 3.0 * typical * (1.0 + 1e-9);
     let count = steps(time_s).filter(|&s| gap(s)).count();
     if count > 0 {
-        let first = steps(time_s).position(gap).unwrap_or(0);
+        let first = steps(time_s).position(gap).unwrap_or(0) + 1;
         let longest_s = steps(time_s).fold(0.0, f64::max);
-        repairs.push(Repair::Gaps { count, line: lines[keep[first + 1]] as usize, longest_s });
+        let row = keep.map_or(first, |keep| keep[first] as usize);
+        repairs.push(Repair::Gaps { count, line: read.line(row), longest_s });
     }
 }

@@ -1,55 +1,111 @@
-//! Bytes to text: byte order marks, UTF-8, Latin-1 in its Windows form, and GB18030 for Chinese systems.
+//! Which character set a file is in, judged by its beginning: byte order marks, UTF-8, UTF-16 without a mark, Latin-1 in
+//! its Windows form, and GB18030 for Chinese systems.
 
 use std::borrow::Cow;
 
 use super::{Encoding, ImportError};
 
-/// Text of a file and the character set it was in.
+/// A character set and how to read it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Charset {
+    pub found: Encoding,
+    codec: &'static encoding_rs::Encoding,
+    /// Bytes of the byte order mark.
+    pub mark: usize,
+}
+
+impl Charset {
+    fn new(found: Encoding, codec: &'static encoding_rs::Encoding, mark: usize) -> Self {
+        Self { found, codec, mark }
+    }
+
+    /// The decoder of a set in which separators and digits are not the bytes of ASCII.
+    pub fn decoder(&self) -> Option<encoding_rs::Decoder> {
+        (self.found == Encoding::Utf16).then(|| self.codec.new_decoder_without_bom_handling())
+    }
+
+    /// A line as text. A line that is no UTF-8 in a file of it is taken for Latin-1: nothing is lost.
+    pub fn text<'a>(&self, line: &'a [u8]) -> Cow<'a, str> {
+        match std::str::from_utf8(line) {
+            Ok(text) => text.into(),
+            Err(_) if self.found == Encoding::Gb18030 => self.codec.decode_without_bom_handling(line).0,
+            Err(_) => encoding_rs::WINDOWS_1252.decode_without_bom_handling(line).0,
+        }
+    }
+}
+
+/// Finds the character set by the first bytes of a file.
 ///
 /// # Errors
 /// [`ImportError::Empty`], [`ImportError::Foreign`], [`ImportError::Binary`].
-pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Encoding), ImportError> {
+pub(super) fn detect(bytes: &[u8]) -> Result<Charset, ImportError> {
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(ImportError::Empty);
     }
     if let Some(format) = foreign(bytes) {
         return Err(ImportError::Foreign { format });
     }
-    if let Some((encoding, mark)) = encoding_rs::Encoding::for_bom(bytes) {
-        let (text, _) = encoding.decode_without_bom_handling(&bytes[mark..]);
-        let found = if encoding == encoding_rs::UTF_8 { Encoding::Utf8 } else { Encoding::Utf16 };
-        return if text.trim().is_empty() { Err(ImportError::Empty) } else { Ok((text, found)) };
+    if let Some((codec, mark)) = encoding_rs::Encoding::for_bom(bytes) {
+        if bytes[mark..].iter().all(|b| b.is_ascii_whitespace() || *b == 0) {
+            return Err(ImportError::Empty);
+        }
+        let found = if codec == encoding_rs::UTF_8 { Encoding::Utf8 } else { Encoding::Utf16 };
+        return Ok(Charset::new(found, codec, mark));
     }
-    let sample = &bytes[..bytes.len().min(65_536)];
+    if let Some(codec) = unmarked_utf16(bytes) {
+        return Ok(Charset::new(Encoding::Utf16, codec, 0));
+    }
+    // A logger that lost its power leaves zeros at the end of its file.
+    let written = bytes.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
+    let sample = &bytes[..written.min(65_536)];
     let odd = sample.iter().filter(|&&b| b == 0 || (b < 32 && !matches!(b, b'\t' | b'\n' | b'\r' | 12 | 26)));
     if odd.count() * 100 > sample.len() || sample.contains(&0) {
         return Err(ImportError::Binary);
     }
-    if let Ok(text) = std::str::from_utf8(bytes) {
-        return Ok((text.into(), Encoding::Utf8));
+    // The sample may end within a letter.
+    if std::str::from_utf8(bytes).map_or_else(|e| e.error_len().is_none(), |_| true) {
+        return Ok(Charset::new(Encoding::Utf8, encoding_rs::UTF_8, 0));
     }
     if high_bytes_come_in_pairs(bytes) {
-        let (text, _, broken) = encoding_rs::GB18030.decode(bytes);
-        if !broken {
-            return Ok((text, Encoding::Gb18030));
+        let whole = &bytes[..bytes.iter().rposition(|&b| b < 0x80).map_or(0, |last| last + 1)];
+        if !encoding_rs::GB18030.decode_without_bom_handling(whole).1 {
+            return Ok(Charset::new(Encoding::Gb18030, encoding_rs::GB18030, 0));
         }
     }
-    let (text, _, _) = encoding_rs::WINDOWS_1252.decode(bytes);
-    Ok((text, Encoding::Windows1252))
+    Ok(Charset::new(Encoding::Windows1252, encoding_rs::WINDOWS_1252, 0))
 }
 
+/// The name of a known format that is no text.
 fn foreign(bytes: &[u8]) -> Option<&'static str> {
-    let known: [(&[u8], &str); 8] = [
-        (b"PK\x03\x04", "a workbook (.xlsx, .ods) or an archive"),
-        (b"\xD0\xCF\x11\xE0", "an old Excel workbook (.xls)"),
+    let known: [(&[u8], &str); 9] = [
+        (b"PK\x03\x04", "a damaged workbook or an archive"),
+        (b"\xD0\xCF\x11\xE0", "a damaged or protected Excel workbook"),
         (b"MATLAB 5.0 MAT", "a MATLAB file"),
         (b"\x89HDF", "an HDF5 file"),
-        (b"PAR1", "a Parquet file"),
+        (b"PAR1", "a damaged Parquet file"),
         (b"RRF2", "a Rerun recording"),
         (b"%PDF", "a PDF document"),
         (b"\x1F\x8B", "a compressed file"),
+        (b"TDSm", "a LabVIEW TDMS file"),
     ];
     known.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, format)| *format)
+}
+
+/// Digits and separators in UTF-16 have a zero in every other byte.
+fn unmarked_utf16(bytes: &[u8]) -> Option<&'static encoding_rs::Encoding> {
+    let sample = &bytes[..bytes.len().min(4096) & !1];
+    let zeros = |odd: usize| sample.iter().skip(odd).step_by(2).filter(|b| **b == 0).count();
+    let (even, odd, pairs) = (zeros(0), zeros(1), sample.len() / 2);
+    if pairs < 2 {
+        return None;
+    }
+    if odd * 10 >= pairs * 7 && even * 10 < pairs {
+        Some(encoding_rs::UTF_16LE)
+    } else if even * 10 >= pairs * 7 && odd * 10 < pairs {
+        Some(encoding_rs::UTF_16BE)
+    } else {
+        None
+    }
 }
 
 /// In Latin-1 accented letters stand alone between plain ones; Chinese comes in pairs.

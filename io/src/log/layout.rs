@@ -1,17 +1,21 @@
 //! Where the data of a text file begins, what separates its fields and what its columns are called.
 
-use super::names::{ColumnName, is_unit_row, read_names};
-use super::split::{SEPARATORS, split};
+use super::header::name_columns;
+use super::names::ColumnName;
+use super::source::Sample;
+use super::split::{Dialect, SEPARATORS, arrow};
 use super::stamp::{DateOrder, Stamp, order_of, parse as parse_stamp};
-use super::{Decimal, ImportError, Separator, number};
+use super::{Decimal, ImportError, ImportOptions, Separator, number};
 
 /// Lines the format is judged by.
 const SAMPLE: usize = 400;
+/// So many times longer a log becomes when days are read as months.
+const TORN: f64 = 3.0;
 
 /// Format of a file.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
-    pub separator: Separator,
+    pub dialect: Dialect,
     pub decimal: Decimal,
     /// Line of the names, counted from 1.
     pub header_line: Option<usize>,
@@ -26,38 +30,25 @@ pub(super) struct Layout {
     pub date_order: DateOrder,
     /// Whether the order of day and month is a guess.
     pub ambiguous_dates: bool,
+    /// Sample time that a header states, in seconds.
+    pub stated_sample_time_s: Option<f64>,
 }
 
-impl Layout {
-    /// First line of data, counted from 1.
-    pub fn first_data_line(&self, lines: &[&str]) -> usize {
-        self.first_row.min(lines.len().saturating_sub(1)) + 1
-    }
-}
-
-/// Lines of a text with any of the three line ends.
-pub(super) fn lines(text: &str) -> Vec<&str> {
-    if text.contains('\n') {
-        text.split('\n').map(|line| line.strip_suffix('\r').unwrap_or(line)).collect()
-    } else {
-        text.split('\r').collect()
-    }
-}
-
-/// Whether a line is blank or a remark.
+/// Whether a line is a remark.
 pub(super) fn is_remark(line: &str) -> bool {
     line.starts_with(['#', '%', '!', '*']) || line.starts_with("//") || line.starts_with("--")
 }
 
-fn is_blank(line: &str) -> bool {
-    line.bytes().all(|b| b.is_ascii_whitespace() || b == 26)
+pub(super) fn is_blank(line: &str) -> bool {
+    line.bytes().all(|b| b.is_ascii_whitespace() || b == 26 || b == 0)
 }
 
 /// Whether a field is a number or a time stamp.
-fn is_value(field: &str, decimal: Decimal) -> bool {
-    number::parse(field, decimal).is_some() || parse_stamp(field, DateOrder::DayFirst).is_some() || {
-        parse_stamp(field, DateOrder::MonthFirst).is_some()
-    }
+pub(super) fn is_value(field: &str, decimal: Decimal) -> bool {
+    number::parse(field, decimal).is_some()
+        || number::parse_quantity(field, decimal).is_some()
+        || parse_stamp(field, DateOrder::DayFirst).is_some()
+        || parse_stamp(field, DateOrder::MonthFirst).is_some()
 }
 
 /// A row's fields counted: all, filled, and those that are numbers or stamps.
@@ -80,7 +71,8 @@ impl Count {
                 (Some(Stamp::Date(_)), Some(Stamp::Clock(_)))
             )
         });
-        Self { all: fields.len(), filled, values: values - split_stamps.count().min(values) }
+        let split = split_stamps.count().min(values);
+        Self { all: fields.len(), filled: filled - split, values: values - split }
     }
 
     fn is_data(self) -> bool {
@@ -89,7 +81,7 @@ impl Count {
 }
 
 struct Candidate {
-    separator: Separator,
+    dialect: Dialect,
     decimal: Decimal,
     score: f64,
     fields: usize,
@@ -100,38 +92,32 @@ struct Candidate {
 ///
 /// # Errors
 /// [`ImportError::NoNumbers`], [`ImportError::OneRow`].
-pub(super) fn find(lines: &[&str]) -> Result<Layout, ImportError> {
+pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, ImportError> {
+    let lines: Vec<&str> = sample.head.iter().map(String::as_str).collect();
     let written: Vec<usize> = (0..lines.len()).filter(|&i| !is_blank(lines[i])).collect();
-    let sample: Vec<usize> = written.iter().copied().filter(|&i| !is_remark(lines[i])).take(SAMPLE).collect();
-    let mut best: Option<Candidate> = None;
-    for separator in SEPARATORS {
-        for decimal in [Decimal::Point, Decimal::Comma] {
-            if separator == Separator::Comma && decimal == Decimal::Comma {
-                continue;
-            }
-            let candidate = judge(lines, &sample, separator, decimal);
-            if candidate.score > best.as_ref().map_or(0.0, |b| b.score * (1.0 + 1e-9)) {
-                best = Some(candidate);
-            }
-        }
-    }
-    let best = best.ok_or(ImportError::NoNumbers { lines: written.len() })?;
-    let (separator, decimal) = (best.separator, best.decimal);
+    let judged: Vec<usize> = written.iter().copied().filter(|&i| !is_remark(lines[i])).take(SAMPLE).collect();
+    let none = || ImportError::NoNumbers { lines: written.len() };
+    let best = best_candidate(&lines, &judged).ok_or_else(none)?;
+    let (dialect, decimal) = (best.dialect, best.decimal);
     let mut fields = Vec::new();
     let mut count = |i: usize| {
-        split(lines[i], separator, &mut fields);
+        dialect.split(lines[i], &mut fields);
         Count::of(&fields, decimal)
     };
     let is_row = |c: Count| c.is_data() && c.all * 3 >= best.fields * 2 && c.filled * 5 >= best.filled * 3;
-    let start = (0..sample.len())
-        .find(|&k| is_row(count(sample[k])) && sample.get(k + 1).is_none_or(|&next| is_row(count(next))));
-    let start = start.ok_or(ImportError::NoNumbers { lines: written.len() })?;
-    let rows: Vec<usize> = written.iter().copied().filter(|&i| i >= sample[start]).collect();
+    let begins = value_in_front(&lines, &judged, dialect, decimal);
+    let start = (0..judged.len()).find(|&k| {
+        begins(lines[judged[k]])
+            && is_row(count(judged[k]))
+            && judged.get(k + 1).is_none_or(|&next| is_row(count(next)))
+    });
+    let start = judged[start.ok_or_else(none)?];
+    let rows: Vec<usize> = written.iter().copied().filter(|&i| i >= start).collect();
     if rows.len() < 2 {
-        return Err(ImportError::OneRow { line: sample[start] + 1 });
+        return Err(ImportError::OneRow { line: start + 1 });
     }
     let mut layout = Layout {
-        separator,
+        dialect,
         decimal,
         header_line: None,
         first_row: rows[0],
@@ -140,21 +126,67 @@ pub(super) fn find(lines: &[&str]) -> Result<Layout, ImportError> {
         names: Vec::new(),
         date_order: DateOrder::DayFirst,
         ambiguous_dates: false,
+        stated_sample_time_s: stated_sample_time(&lines[..rows[0]], decimal),
     };
-    if numbered_header(lines, &rows, separator, decimal) {
+    if numbered_header(&lines, &rows, &layout) {
         layout.first_row = rows[1];
         layout.header_line = Some(rows[0] + 1);
     }
-    find_columns(lines, &rows, &mut layout);
-    name_columns(lines, &mut layout);
+    let all: Vec<&str> =
+        lines[layout.first_row..].iter().copied().chain(sample.beyond.iter().map(String::as_str)).collect();
+    find_columns(&all, &mut layout);
+    if let Some(order) = options.date_order {
+        layout.date_order = order;
+        layout.ambiguous_dates = false;
+    }
+    name_columns(&lines, &mut layout);
     Ok(layout)
 }
 
-fn judge(lines: &[&str], sample: &[usize], separator: Separator, decimal: Decimal) -> Candidate {
+fn best_candidate(lines: &[&str], judged: &[usize]) -> Option<Candidate> {
+    let arrows = judged.iter().filter(|&&i| arrow(lines[i]).is_some()).count();
+    let mut best: Option<Candidate> = None;
+    for labelled in [false, true] {
+        for separator in SEPARATORS {
+            for decimal in [Decimal::Point, Decimal::Comma] {
+                if separator == Separator::Comma && decimal == Decimal::Comma {
+                    continue;
+                }
+                let dialect = Dialect { separator, arrow: arrows * 2 > judged.len(), labelled };
+                let candidate = judge(lines, judged, dialect, decimal);
+                if candidate.score > best.as_ref().map_or(0.0, |b| b.score * (1.0 + 1e-9)) {
+                    best = Some(candidate);
+                }
+            }
+        }
+    }
+    best
+}
+
+/// What tells the first row from lines such as `Delta_X 0.1 0.1` above it: where nearly all lines have a value in front,
+/// it has one too.
+fn value_in_front<'a>(
+    lines: &[&'a str],
+    judged: &[usize],
+    dialect: Dialect,
+    decimal: Decimal,
+) -> impl Fn(&'a str) -> bool + use<'a> {
+    let has_value = move |line: &'a str| {
+        let mut fields = Vec::new();
+        dialect.split(line, &mut fields);
+        fields.first().is_none_or(|f| f.is_empty() || is_value(f, decimal))
+    };
+    let half = &judged[judged.len() / 2..];
+    let with = half.iter().filter(|&&i| has_value(lines[i])).count();
+    let always = with * 10 >= half.len() * 9;
+    move |line| !always || has_value(line)
+}
+
+fn judge(lines: &[&str], judged: &[usize], dialect: Dialect, decimal: Decimal) -> Candidate {
     let mut fields = Vec::new();
     let mut counts: Vec<Count> = Vec::new();
-    for &i in sample {
-        split(lines[i], separator, &mut fields);
+    for &i in judged {
+        dialect.split(lines[i], &mut fields);
         let count = Count::of(&fields, decimal);
         if count.is_data() {
             counts.push(count);
@@ -172,17 +204,18 @@ fn judge(lines: &[&str], sample: &[usize], separator: Separator, decimal: Decima
     let (values, filled) = alike.fold((0, 0), |(v, f), c| (v + c.values, f + c.filled));
     let purity = if filled > 0 { values as f64 / filled as f64 } else { 0.0 };
     // Blanks also stand inside dates and names: they separate only where nothing else does.
-    let trust = if separator == Separator::Blanks { 0.6 } else { 1.0 };
+    let trust = if dialect.separator == Separator::Blanks { 0.6 } else { 1.0 };
+    let trust = if dialect.labelled { 0.95 * trust } else { trust };
     let score = values as f64 * purity.min(1.0).powi(3) * trust;
-    Candidate { separator, decimal, score, fields: most.1, filled: filled / most.0.max(1) }
+    Candidate { dialect, decimal, score, fields: most.1, filled: filled / most.0.max(1) }
 }
 
 /// A first row of small whole numbers in turn, one of them left out: names of columns that have none.
-fn numbered_header(lines: &[&str], rows: &[usize], separator: Separator, decimal: Decimal) -> bool {
+fn numbered_header(lines: &[&str], rows: &[usize], layout: &Layout) -> bool {
     let (mut first, mut second) = (Vec::new(), Vec::new());
-    split(lines[rows[0]], separator, &mut first);
-    split(lines[rows[1]], separator, &mut second);
-    let filled: Vec<f64> = first.iter().filter_map(|f| number::parse(f, decimal)).collect();
+    layout.dialect.split(lines[rows[0]], &mut first);
+    layout.dialect.split(lines[rows[1]], &mut second);
+    let filled: Vec<f64> = first.iter().filter_map(|f| number::parse(f, layout.decimal)).collect();
     let counts_up = filled.iter().enumerate().all(|(i, &v)| v == i as f64);
     first.len() == second.len()
         && first.first().is_some_and(|f| f.is_empty())
@@ -191,84 +224,83 @@ fn numbered_header(lines: &[&str], rows: &[usize], separator: Separator, decimal
         && counts_up
 }
 
-fn find_columns(lines: &[&str], rows: &[usize], layout: &mut Layout) {
-    let stride = rows.len() / SAMPLE + 1;
+/// The sample time a recorder writes above rows without a time: `Delta_X 0.1`, `Sample time [s]: 0.2`.
+fn stated_sample_time(above: &[&str], decimal: Decimal) -> Option<f64> {
+    const NAMES: [&str; 6] = ["delta_x", "sample time", "sampling time", "abtastzeit", "dt", "ts"];
+    above.iter().find_map(|line| {
+        let lower = line.trim_start_matches(['#', '%', ' ', '"']).to_lowercase();
+        let rest = NAMES.iter().find_map(|name| lower.strip_prefix(name))?;
+        let stands_alone = rest.starts_with([' ', '\t', ':', '=', ';', ',', '[', '(']);
+        let seconds = !rest.contains("ms") && !rest.contains("min");
+        let mut words = rest.split([' ', '\t', ':', '=', ';']).filter(|w| !w.is_empty());
+        let value = words.find_map(|word| number::parse(word, decimal))?;
+        (stands_alone && seconds && value > 0.0).then_some(value)
+    })
+}
+
+fn find_columns(rows: &[&str], layout: &mut Layout) {
+    let stride = rows.len() / (4 * SAMPLE) + 1;
     let mut filled = vec![false; layout.fields];
     let mut fields = Vec::new();
-    let (mut day, mut month, mut dates) = (false, false, false);
-    for &i in rows.iter().filter(|&&i| i >= layout.first_row).step_by(stride) {
-        split(lines[i], layout.separator, &mut fields);
+    let mut dates = Dates::default();
+    for line in rows.iter().step_by(stride).filter(|line| !is_remark(line)) {
+        layout.dialect.split(line, &mut fields);
         for (seen, field) in filled.iter_mut().zip(&fields) {
             *seen |= !field.is_empty();
-            if field.contains('/') || field.matches(['.', '-']).count() > 1 {
-                let stamp =
-                    parse_stamp(field, DateOrder::DayFirst).or(parse_stamp(field, DateOrder::MonthFirst));
-                if matches!(stamp, Some(Stamp::Full(_) | Stamp::Date(_))) {
-                    dates = true;
-                    day |= order_of(field) == Some(DateOrder::DayFirst);
-                    month |= order_of(field) == Some(DateOrder::MonthFirst);
-                }
-            }
+            dates.look_at(field);
         }
     }
     layout.used = (0..layout.fields).filter(|&i| filled[i]).collect();
-    layout.date_order = if month && !day { DateOrder::MonthFirst } else { DateOrder::DayFirst };
-    layout.ambiguous_dates = dates && !day && !month;
+    (layout.date_order, layout.ambiguous_dates) = dates.order();
 }
 
-/// Names from the lines above the data: the topmost of the nearest block of lines with as many fields.
-fn name_columns(lines: &[&str], layout: &mut Layout) {
-    let mut block: Vec<(usize, Vec<String>)> = Vec::new();
-    if let Some(line) = layout.header_line {
-        let mut fields = Vec::new();
-        split(lines[line - 1], layout.separator, &mut fields);
-        block.push((line - 1, layout.used.iter().map(|&i| fields[i].to_owned()).collect()));
-    } else {
-        for i in (0..layout.first_row).rev() {
-            match header_fields(lines[i], layout) {
-                Some(fields) => block.insert(0, (i, fields)),
-                None if block.is_empty() => {}
-                None => break,
-            }
-            if layout.used.len() == 1 {
-                break;
-            }
-        }
-    }
-    let Some((line, header)) = block.first() else {
-        layout.names = read_names(&vec![String::new(); layout.used.len()], None);
-        return;
-    };
-    let units = block.get(1).map(|(_, fields)| fields).filter(|fields| is_unit_row(fields));
-    layout.header_line = Some(line + 1);
-    layout.names = read_names(header, units.map(Vec::as_slice));
+/// What the dates of a file tell of their order: those that read one way only, and how long a log they make.
+#[derive(Debug, Default)]
+struct Dates {
+    day_first: bool,
+    month_first: bool,
+    any: bool,
+    /// Earliest and latest by either order, in seconds.
+    ends_s: [Option<[f64; 2]>; 2],
 }
 
-/// Fields of a header line, one a column, by the separator of the data or another.
-fn header_fields(line: &str, layout: &Layout) -> Option<Vec<String>> {
-    let line = line.trim_start_matches(['\u{feff}', ' ']);
-    let line = if is_remark(line) { line.trim_start_matches(['#', '%', '!', '*', '/', '-']) } else { line };
-    if is_blank(line) {
-        return None;
-    }
-    let mut fields = Vec::new();
-    let others = SEPARATORS.into_iter().filter(|&s| s != layout.separator);
-    for separator in std::iter::once(layout.separator).chain(others) {
-        split(line, separator, &mut fields);
-        let words = fields.iter().filter(|f| !f.is_empty() && !is_value(f, layout.decimal)).count();
-        let filled: Vec<&str> = fields.iter().copied().filter(|f| !f.is_empty()).collect();
-        if words * 2 < filled.len() || words == 0 {
-            continue;
+impl Dates {
+    fn look_at(&mut self, field: &str) {
+        let is_date = field.contains('/') || field.matches(['.', '-']).count() > 1;
+        if !is_date || names_its_order(field) {
+            return;
         }
-        if filled.len() == layout.used.len() && fields.len() != layout.fields {
-            return Some(filled.iter().map(|f| (*f).to_owned()).collect());
-        }
-        if fields.len() >= layout.fields
-            && filled.len() + 1 >= layout.used.len()
-            && fields.len() <= layout.fields + 1
-        {
-            return Some(layout.used.iter().map(|&i| fields[i].to_owned()).collect());
+        for (k, order) in [DateOrder::DayFirst, DateOrder::MonthFirst].into_iter().enumerate() {
+            let Some(stamp @ (Stamp::Full { .. } | Stamp::Date(_))) = parse_stamp(field, order) else {
+                continue;
+            };
+            let s = stamp.seconds();
+            let [from, to] = self.ends_s[k].unwrap_or([s, s]);
+            self.ends_s[k] = Some([from.min(s), to.max(s)]);
+            self.any = true;
+            self.day_first |= order_of(field) == Some(DateOrder::DayFirst);
+            self.month_first |= order_of(field) == Some(DateOrder::MonthFirst);
         }
     }
-    None
+
+    /// The order, and whether it is a guess. A month read as a day tears a log of days apart into one of months.
+    fn order(&self) -> (DateOrder, bool) {
+        let length = |k: usize| self.ends_s[k].map_or(f64::INFINITY, |[from, to]| to - from);
+        match (self.day_first, self.month_first) {
+            (true, _) => (DateOrder::DayFirst, false),
+            (false, true) => (DateOrder::MonthFirst, false),
+            _ if length(0) > TORN * length(1) => (DateOrder::MonthFirst, false),
+            _ => (DateOrder::DayFirst, self.any && length(1) <= TORN * length(0)),
+        }
+    }
+}
+
+/// Whether the year stands first, the month has a name or dots stand between, as where the day comes first: then nothing
+/// is to be guessed.
+fn names_its_order(date: &str) -> bool {
+    date.as_bytes().get(..4).is_some_and(|y| y.iter().all(u8::is_ascii_digit))
+        || date
+            .split([' ', 'T', ','])
+            .next()
+            .is_some_and(|d| d.contains(char::is_alphabetic) || d.matches('.').count() == 2)
 }

@@ -1,26 +1,57 @@
-//! Import of plant logs: text as plants write it becomes a [`LogTable`] and a list of what was repaired.
+//! Import of plant logs: files as plants write them become a [`LogTable`] and a list of what was repaired.
 //!
-//! Bytes → text (`decode`) → separator, decimal mark, header (`layout`) → columns (`rows`) → time axis (`axis`) →
-//! which column is PV, SP, MV (`roles`). An import reads what can be read and says what it left out; only
-//! files with nothing to read are refused, with [`ImportError`]. The file itself is never written to.
+//! Text goes bytes → character set (`decode`) → separator, decimal mark, header (`layout`, `header`) → columns (`rows`,
+//! line by line; `fast` for those that are as they should be). It is read block by block (`source`): what is in memory
+//! is the numbers. Workbooks, Parquet and recordings have readers of their own. From there all go one way: layouts of
+//! one row a value or several time columns are turned (`arrange`), the time axis is found and put in order (`axis`,
+//! `order`), columns are proposed for PV, SP, MV and mode (`roles`). Several files become one (`join`).
+//!
+//! An import reads what can be read and says what it left out; only files with nothing to read are refused, with
+//! [`ImportError`]. The file itself is never written to.
 
+mod arrange;
+mod assemble;
 mod axis;
 mod behaviour;
+mod calendar;
 mod decode;
 mod error;
+mod fast;
+mod header;
+mod join;
+mod kinds;
 mod layout;
+mod merge;
 mod names;
+mod notes;
 mod number;
+mod open;
+mod order;
+mod pairs;
+mod parquet;
+mod pivot;
+mod read;
+mod recorded;
+mod repair;
 mod report;
+mod role_words;
 mod roles;
 mod rows;
+mod source;
 mod split;
 mod stamp;
+mod text;
+mod workbook;
 
-use vasos_engine::signal::{LogColumn, LogTable};
+use vasos_engine::signal::LogTable;
 
 pub use error::ImportError;
-pub use report::{Decimal, Encoding, ImportReport, Repair, Roles, Separator, TimeKind};
+pub use open::{import_log, open_log, open_logs};
+pub use repair::Repair;
+pub use report::{
+    Decimal, Encoding, FileFormat, ImportReport, JoinedFile, Roles, Separator, TextFormat, TimeKind,
+};
+pub use stamp::DateOrder;
 
 /// What the user may say about a file ahead of its import; all of it can be found out.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -29,6 +60,10 @@ pub struct ImportOptions {
     pub sample_time_s: Option<f64>,
     /// Time column by name, where the proposal is wrong.
     pub time_column: Option<String>,
+    /// Order of day and month, where dates read both ways.
+    pub date_order: Option<DateOrder>,
+    /// Sheet of a workbook, where not the one with most rows.
+    pub sheet: Option<String>,
 }
 
 /// A log and how it was read.
@@ -38,65 +73,4 @@ pub struct ImportedLog {
     pub table: LogTable,
     /// How it was read, what was repaired and which columns are proposed.
     pub report: ImportReport,
-}
-
-/// Reads a text log.
-///
-/// `name` is the title of the table, usually the file's name. Time comes out in seconds from the first row, never
-/// decreasing; missing values as NaN.
-///
-/// # Errors
-/// [`ImportError`] for a file that holds nothing to read, with what to do.
-pub fn import_log(name: &str, bytes: &[u8], options: &ImportOptions) -> Result<ImportedLog, ImportError> {
-    let (text, encoding) = decode::decode(bytes)?;
-    let lines = layout::lines(&text);
-    let layout = layout::find(&lines)?;
-    let mut repairs = Vec::new();
-    let read = rows::read(&lines, &layout, &mut repairs)?;
-    let axis = axis::find(&read, options, &mut repairs)?;
-    let names = layout.names.clone();
-    let kept = axis.keep.as_deref();
-    let pick = |values: Vec<f64>| match kept {
-        Some(rows) => rows.iter().map(|&r| values[r]).collect(),
-        None => values,
-    };
-    let mut columns = Vec::new();
-    for (i, column) in read.columns.into_iter().enumerate() {
-        if axis.columns.contains(&i) || column.is_text_only() {
-            continue;
-        }
-        columns.push(LogColumn {
-            name: names[i].name.clone(),
-            unit: names[i].unit.clone(),
-            values: pick(column.values),
-            states: column.states,
-        });
-    }
-    if columns.is_empty() {
-        return Err(ImportError::OnlyTime { rows: axis.time_s.len() });
-    }
-    let file_lines = match kept {
-        Some(rows) => rows.iter().map(|&r| read.lines[r]).collect(),
-        None => read.lines,
-    };
-    let table = LogTable {
-        name: name.to_owned(),
-        time_s: axis.time_s,
-        start: axis.start,
-        columns,
-        lines: file_lines,
-    };
-    let roles = roles::propose(&table);
-    let report = ImportReport {
-        encoding,
-        separator: layout.separator,
-        decimal: layout.decimal,
-        header_line: layout.header_line,
-        first_data_line: layout.first_data_line(&lines),
-        time: axis.kind,
-        time_column: axis.columns.first().map(|&i| names[i].name.clone()),
-        repairs,
-        roles,
-    };
-    Ok(ImportedLog { table, report })
 }

@@ -8,14 +8,29 @@ pub(super) struct ColumnName {
 }
 
 /// Units of process logs, in lower case.
-const UNITS: [&str; 60] = [
+const UNITS: [&str; 84] = [
     "s", "sec", "seconds", "ms", "min", "h", "hr", "hours", "d", "%", "pct", "fract", "frac", "-", "°c",
     "degc", "c", "°f", "degf", "f", "k", "v", "mv", "volts", "a", "ma", "w", "kw", "mw", "bar", "barg",
     "mbar", "pa", "kpa", "mpa", "psi", "psig", "atm", "mmh2o", "mm", "cm", "m", "l", "ml", "m3", "l/s",
     "l/min", "l/h", "ml/s", "cm3/s", "m3/s", "m3/h", "kg", "kg/s", "kg/h", "t/h", "rpm", "hz", "ph", "ppm",
+    "m³/h", "m³/s", "m³", "cm³/s", "nm3/h", "nm³/h", "kg/m3", "kg/m³", "mol/l", "us/cm", "µs/cm", "ntu",
+    "gpm", "gal/min", "lb/h", "klb/h", "scfh", "scfm", "in", "ft", "inh2o", "mg/l", "deg", "°",
 ];
 
-/// Whether a line under the names holds their units.
+/// Whether a word is a unit.
+pub(super) fn is_unit(word: &str) -> bool {
+    UNITS.contains(&word.to_lowercase().as_str())
+}
+
+/// Whether a name is a tag: letters with digits or marks among them, no blanks.
+pub(super) fn is_tag(name: &str) -> bool {
+    let (name, _) = name_and_unit(name);
+    name.contains(char::is_alphabetic)
+        && !name.contains(char::is_whitespace)
+        && name.contains(|c: char| c.is_ascii_digit() || matches!(c, '.' | '_' | ':' | '/' | '-' | '\\'))
+}
+
+/// Whether a line among the names holds their units.
 pub(super) fn is_unit_row(fields: &[String]) -> bool {
     let filled: Vec<String> =
         fields.iter().filter(|f| !f.is_empty()).map(|f| bare(f).to_lowercase()).collect();

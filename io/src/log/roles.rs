@@ -4,6 +4,7 @@ use vasos_engine::signal::LogTable;
 
 use super::Roles;
 use super::behaviour::{Behaviour, Motion};
+use super::role_words::{CERTAIN, LIKELY};
 
 /// A part of a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,113 +14,6 @@ pub(super) enum Role {
     Mv,
     Mode,
 }
-
-/// Words that can mean nothing else, in loop and historian tags.
-const CERTAIN: [(&str, Role); 37] = [
-    ("pv", Role::Pv),
-    ("measurement", Role::Pv),
-    ("measured", Role::Pv),
-    ("medida", Role::Pv),
-    ("medicao", Role::Pv),
-    ("sp", Role::Sp),
-    ("sv", Role::Sp),
-    ("setpoint", Role::Sp),
-    ("setpt", Role::Sp),
-    ("spt", Role::Sp),
-    ("target", Role::Sp),
-    ("reference", Role::Sp),
-    ("referencia", Role::Sp),
-    ("ref", Role::Sp),
-    ("desired", Role::Sp),
-    ("desejado", Role::Sp),
-    ("consigne", Role::Sp),
-    ("sollwert", Role::Sp),
-    ("设定", Role::Sp),
-    ("mv", Role::Mv),
-    ("op", Role::Mv),
-    ("co", Role::Mv),
-    ("cv", Role::Mv),
-    ("controlleroutput", Role::Mv),
-    ("command", Role::Mv),
-    ("comando", Role::Mv),
-    ("manipulated", Role::Mv),
-    ("manipulada", Role::Mv),
-    ("actuator", Role::Mv),
-    ("atuador", Role::Mv),
-    ("du", Role::Mv),
-    ("mode", Role::Mode),
-    ("modo", Role::Mode),
-    ("auto", Role::Mode),
-    ("automan", Role::Mode),
-    ("am", Role::Mode),
-    ("betriebsart", Role::Mode),
-];
-
-/// Words of quantities and devices, which lean one way.
-const LIKELY: [(&str, Role); 62] = [
-    ("u", Role::Mv),
-    ("q", Role::Mv),
-    ("heater", Role::Mv),
-    ("heat", Role::Mv),
-    ("aquecedor", Role::Mv),
-    ("resistencia", Role::Mv),
-    ("pump", Role::Mv),
-    ("bomba", Role::Mv),
-    ("valve", Role::Mv),
-    ("valvula", Role::Mv),
-    ("voltage", Role::Mv),
-    ("volt", Role::Mv),
-    ("volts", Role::Mv),
-    ("tensao", Role::Mv),
-    ("pwm", Role::Mv),
-    ("duty", Role::Mv),
-    ("power", Role::Mv),
-    ("potencia", Role::Mv),
-    ("output", Role::Mv),
-    ("saida", Role::Mv),
-    ("input", Role::Mv),
-    ("entrada", Role::Mv),
-    ("opening", Role::Mv),
-    ("abertura", Role::Mv),
-    ("drive", Role::Mv),
-    ("motor", Role::Mv),
-    ("fan", Role::Mv),
-    ("speed", Role::Mv),
-    ("control", Role::Mv),
-    ("controle", Role::Mv),
-    ("inflow", Role::Mv),
-    ("flow", Role::Mv),
-    ("vazao", Role::Mv),
-    ("steam", Role::Mv),
-    ("vapor", Role::Mv),
-    ("level", Role::Pv),
-    ("nivel", Role::Pv),
-    ("temperature", Role::Pv),
-    ("temperatura", Role::Pv),
-    ("temp", Role::Pv),
-    ("pressure", Role::Pv),
-    ("pressao", Role::Pv),
-    ("process", Role::Pv),
-    ("processo", Role::Pv),
-    ("sensor", Role::Pv),
-    ("height", Role::Pv),
-    ("altura", Role::Pv),
-    ("position", Role::Pv),
-    ("posicao", Role::Pv),
-    ("concentration", Role::Pv),
-    ("ph", Role::Pv),
-    ("y", Role::Pv),
-    ("h", Role::Pv),
-    ("t", Role::Pv),
-    ("tt", Role::Pv),
-    ("lt", Role::Pv),
-    ("pt", Role::Pv),
-    ("ft", Role::Pv),
-    ("r", Role::Sp),
-    ("w", Role::Sp),
-    ("ysp", Role::Sp),
-    ("status", Role::Mode),
-];
 
 /// A role a name speaks for, and how loudly: 3 certain and last in the tag, 2 certain, 1 likely.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,17 +27,20 @@ pub(super) fn propose(table: &LogTable) -> Roles {
     let columns = &table.columns;
     let behaviour = Behaviour::of(table);
     let hints: Vec<Option<Hint>> = columns.iter().map(|c| hint(&c.name, c.unit.as_deref())).collect();
-    let mut taken: Vec<usize> = Vec::new();
+    // Words are a mode; nothing can be fitted to them.
+    let words: Vec<usize> = (0..columns.len()).filter(|&i| !columns[i].states.is_empty()).collect();
+    let mut taken: Vec<usize> = words.clone();
     let moving = |i: usize| !matches!(behaviour.motion[i], Motion::Still | Motion::Counts);
-    let pv = best_named(&hints, Role::Pv, &[], |i| (moving(i), 0));
+    let pv = best_named(&hints, Role::Pv, &words, |i| (moving(i), 0));
     taken.extend(pv);
     let kin = |i: usize| pv.map_or(0, |pv| kinship(&columns[pv].name, &columns[i].name));
     let mut mv = best_named(&hints, Role::Mv, &taken, |i| (moving(i), kin(i)));
     taken.extend(mv);
     let mut sp = best_named(&hints, Role::Sp, &taken, |i| (true, kin(i)));
     taken.extend(sp);
-    let mode = best_named(&hints, Role::Mode, &taken, |i| (true, kin(i)))
-        .or_else(|| columns.iter().position(|c| !c.states.is_empty()));
+    let not_words: Vec<usize> = taken.iter().copied().filter(|i| !words.contains(i)).collect();
+    let mode =
+        best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| words.first().copied());
     taken.extend(mode);
     // A likely name on a column that never moves gives way to one that does.
     let named_mv = mv;
@@ -209,10 +106,16 @@ fn kinship(a: &str, b: &str) -> usize {
 }
 
 fn hint(name: &str, unit: Option<&str>) -> Option<Hint> {
-    let words = words(name);
+    let mut words = words(name);
+    let certain = |word: &str| CERTAIN.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
+    // PV.CV is the current value of the PV.
+    if let [.., part, "cv" | "value" | "val"] = words.iter().map(String::as_str).collect::<Vec<_>>()[..]
+        && certain(part).is_some()
+    {
+        words.pop();
+    }
     let joined = words.join("");
     let last = words.iter().rev().find(|w| !w.bytes().all(|b| b.is_ascii_digit()));
-    let certain = |word: &str| CERTAIN.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
     let two_words = words.windows(2).find_map(|w| certain(&w.concat()));
     if joined.contains("setpoint") || words.iter().any(|w| w.len() <= 4 && w.len() > 2 && w.ends_with("sp")) {
         return Some(Hint { role: Role::Sp, weight: 3 });
@@ -253,7 +156,8 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-fn plain(c: char) -> char {
+/// A letter without its accent.
+pub(super) fn plain(c: char) -> char {
     match c {
         'á' | 'à' | 'â' | 'ã' | 'ä' => 'a',
         'é' | 'ê' | 'è' => 'e',

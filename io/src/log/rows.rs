@@ -1,105 +1,61 @@
-//! The rows of a file into columns of numbers.
+//! The rows of a text file into columns, line by line.
 
-use super::layout::{Layout, is_remark};
-use super::split::split;
-use super::stamp::{Stamp, parse as parse_stamp};
-use super::{Decimal, ImportError, Repair, Separator, number};
+use std::io::{Read as Input, Seek};
 
-/// Rows a column's kind is judged by.
-const SAMPLE: usize = 200;
-/// Most words a column of states has.
-const MOST_STATES: usize = 32;
+use super::decode::Charset;
+use super::fast::{Slot, Taken, quick_row};
+use super::kinds::kinds;
+use super::layout::{Layout, is_blank, is_remark};
+use super::read::{Kind, Read, ReadColumn};
+use super::source::{Blocks, Sample};
+use super::stamp::{DateOrder, Stamp, StampReader, parse as parse_stamp};
+use super::{ImportError, Repair, number};
 
-/// What a column holds.
+/// Letters of a text that could not be read that are told.
+const SHOWN: usize = 24;
+
+/// Why a file has to be read once more: its sample told less than all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Number,
-    /// Date and time of day, date alone, or time of day alone.
-    Full,
-    Date,
-    Clock,
-    Words,
-}
-
-/// A column as read: numbers, seconds of stamps, or indices into `states`.
-#[derive(Debug, Clone)]
-pub(super) struct ReadColumn {
-    pub kind: Kind,
-    pub values: Vec<f64>,
-    pub states: Vec<String>,
-}
-
-impl ReadColumn {
-    /// Whether its words are too many to be states.
-    pub fn is_text_only(&self) -> bool {
-        self.kind == Kind::Words
-            && (self.states.len() > MOST_STATES || self.states.len() * 2 > self.values.len())
-    }
-}
-
-/// All columns, and the line of each row, counted from 1.
-#[derive(Debug, Clone)]
-pub(super) struct Read {
-    pub columns: Vec<ReadColumn>,
-    pub names: Vec<String>,
-    pub units: Vec<Option<String>>,
-    pub lines: Vec<u32>,
+enum Again {
+    /// A date that only reads the other way round.
+    Order(DateOrder),
+    /// Something in a field that was empty in all lines of the sample.
+    Fields,
 }
 
 /// Reads all rows below the header; what is no row is skipped and noted.
 ///
 /// # Errors
-/// [`ImportError::OneRow`] when fewer than two rows are left.
-pub(super) fn read(lines: &[&str], layout: &Layout, repairs: &mut Vec<Repair>) -> Result<Read, ImportError> {
-    let kinds = kinds(lines, layout);
-    let rows = lines.len() - layout.first_row;
-    let only_numbers = layout.used.len() == layout.fields && kinds.iter().all(|k| *k == Kind::Number);
-    let plain = plain_marks(layout).filter(|_| only_numbers);
-    let mut reader = Reader {
-        layout,
-        columns: kinds
-            .into_iter()
-            .map(|kind| ReadColumn { kind, values: Vec::with_capacity(rows), states: Vec::new() })
-            .collect(),
-        missing: vec![Missing::default(); layout.used.len()],
-        lines: Vec::with_capacity(rows),
-        skipped: Tally::default(),
-        ragged: Tally::default(),
-        plain,
-    };
-    let mut fields = Vec::new();
-    for (i, &line) in lines.iter().enumerate().skip(layout.first_row) {
-        if line.is_empty() {
-            continue;
-        }
-        if is_remark(line) {
-            reader.skipped.add(i + 1);
-            continue;
-        }
-        if !reader.plain_row(i + 1, line.as_bytes()) {
-            split(line, layout.separator, &mut fields);
-            reader.row(i + 1, &fields);
+/// [`ImportError::OneRow`] when fewer than two rows are left, [`ImportError::Read`] when the disk fails.
+pub(super) fn read<R: Input + Seek>(
+    input: &mut R,
+    sample: &Sample,
+    layout: &mut Layout,
+    repairs: &mut Vec<Repair>,
+) -> Result<Read, ImportError> {
+    loop {
+        let mut reader = Reader::new(sample, layout);
+        let mut blocks = Blocks::new(&mut *input, sample)?;
+        let again = reader.all(&mut blocks, sample.line_end)?;
+        match again {
+            Some(Again::Order(order)) => {
+                layout.date_order = order;
+                layout.ambiguous_dates = false;
+            }
+            Some(Again::Fields) => {
+                let names = std::mem::take(&mut layout.names);
+                let mut known = layout.used.iter().copied().zip(names).peekable();
+                let named = (0..layout.fields).map(|at| match known.next_if(|(used, _)| *used == at) {
+                    Some((_, name)) => name,
+                    None => super::names::ColumnName { name: format!("field {}", at + 1), unit: None },
+                });
+                layout.names = named.collect();
+                layout.used = (0..layout.fields).collect();
+            }
+            None if reader.lines.len() < 2 => return Err(ImportError::OneRow { line: layout.first_row + 1 }),
+            None => return Ok(reader.finish(repairs)),
         }
     }
-    if reader.lines.len() < 2 {
-        return Err(ImportError::OneRow { line: layout.first_row + 1 });
-    }
-    Ok(reader.finish(repairs))
-}
-
-fn plain_marks(layout: &Layout) -> Option<(u8, u8)> {
-    let mark = match layout.decimal {
-        Decimal::Point => b'.',
-        Decimal::Comma => b',',
-    };
-    let separator = match layout.separator {
-        Separator::Tab => b'\t',
-        Separator::Semicolon => b';',
-        Separator::Comma => b',',
-        Separator::Bar => b'|',
-        Separator::DoubleBar | Separator::Blanks => return None,
-    };
-    Some((mark, separator))
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -117,60 +73,131 @@ impl Tally {
     }
 }
 
+/// Values a column lacks: empty fields, and texts that are none.
 #[derive(Debug, Clone, Default)]
 struct Missing {
-    tally: Tally,
+    empty: Tally,
+    unread: Tally,
     text: String,
 }
 
 struct Reader<'a> {
     layout: &'a Layout,
+    charset: Charset,
     columns: Vec<ReadColumn>,
+    stamps: Vec<StampReader>,
+    /// Unit behind the numbers of each column.
+    suffixes: Vec<Option<String>>,
     missing: Vec<Missing>,
     lines: Vec<u32>,
     skipped: Tally,
     ragged: Tally,
-    /// Decimal mark and separator, where rows can be nothing but numbers.
-    plain: Option<(u8, u8)>,
+    /// What each field of a line goes to, where lines can be read without splitting them.
+    slots: Vec<Slot>,
+    /// Columns found empty in a line.
+    blanks: Vec<usize>,
+    again: Option<Again>,
 }
 
-impl Reader<'_> {
-    /// A row of nothing but plain numbers, read in one go; otherwise leaves no trace and says so.
-    fn plain_row(&mut self, line: usize, bytes: &[u8]) -> bool {
-        let Some((mark, separator)) = self.plain else { return false };
-        let (mut at, last) = (0, self.columns.len() - 1);
-        for i in 0..=last {
-            let read = number::scan(bytes, at, mark);
-            match read {
-                Some((value, end)) if bytes.get(end) == if i == last { None } else { Some(&separator) } => {
-                    self.columns[i].values.push(value);
-                    at = end + 1;
+impl<'a> Reader<'a> {
+    fn new(sample: &Sample, layout: &'a Layout) -> Self {
+        let kinds = kinds(sample, layout);
+        let plain = layout.dialect.is_plain() && layout.dialect.separator != super::Separator::DoubleBar;
+        let slots = if plain {
+            let column = |at: usize| layout.used.iter().position(|&used| used == at);
+            (0..layout.fields).map(|at| column(at).map_or(Slot::Empty, Slot::Column)).collect()
+        } else {
+            Vec::new()
+        };
+        let rows = sample.expected_lines;
+        let columns = kinds.iter().zip(&layout.names).map(|(&kind, name)| {
+            ReadColumn::new(name.name.clone(), name.unit.clone(), kind, Vec::with_capacity(rows))
+        });
+        Self {
+            layout,
+            charset: sample.charset,
+            columns: columns.collect(),
+            stamps: vec![StampReader::new(layout.date_order); kinds.len()],
+            suffixes: vec![None; kinds.len()],
+            missing: vec![Missing::default(); kinds.len()],
+            lines: Vec::with_capacity(rows),
+            skipped: Tally::default(),
+            ragged: Tally::default(),
+            slots,
+            blanks: Vec::new(),
+            again: None,
+        }
+    }
+
+    fn all<R: Input + Seek>(
+        &mut self,
+        blocks: &mut Blocks<R>,
+        line_end: u8,
+    ) -> Result<Option<Again>, ImportError> {
+        let mut number = 0;
+        while let Some(block) = blocks.next()? {
+            let mut start = 0;
+            while start < block.len() {
+                let end = memchr::memchr(line_end, &block[start..]).map_or(block.len(), |i| start + i);
+                number += 1;
+                if number > self.layout.first_row {
+                    self.line(number, block, start, end);
                 }
-                _ => {
-                    self.columns[..i].iter_mut().for_each(|c| {
-                        c.values.pop();
-                    });
-                    return false;
-                }
+                start = end + 1;
+            }
+            if self.again.is_some() {
+                break;
             }
         }
-        self.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
-        true
+        Ok(self.again)
+    }
+
+    fn line(&mut self, number: usize, block: &[u8], start: usize, end: usize) {
+        let end = if end > start && block[end - 1] == b'\r' { end - 1 } else { end };
+        if start == end {
+            return;
+        }
+        if !self.slots.is_empty() {
+            let taken = Taken {
+                columns: &mut self.columns,
+                stamps: &mut self.stamps,
+                blanks: &mut self.blanks,
+                separator: self.layout.dialect.separator.byte(),
+                mark: self.layout.decimal.mark(),
+            };
+            if quick_row(taken, &self.slots, block, start, end) {
+                self.lines.push(u32::try_from(number).unwrap_or(u32::MAX));
+                for column in self.blanks.drain(..) {
+                    self.missing[column].empty.add(number);
+                }
+                return;
+            }
+            let rows = self.lines.len();
+            self.columns.iter_mut().for_each(|c| c.values.truncate(rows));
+            self.blanks.clear();
+        }
+        let charset = self.charset;
+        let text = charset.text(&block[start..end]);
+        if is_remark(&text) {
+            self.skipped.add(number);
+        } else if !is_blank(&text) {
+            let mut fields = Vec::new();
+            self.layout.dialect.split(&text, &mut fields);
+            self.row(number, &fields);
+        }
     }
 
     fn row(&mut self, line: usize, fields: &[&str]) {
         let layout = self.layout;
+        let rows = self.lines.len();
         let mut found = 0;
-        for (column, &at) in self.columns.iter_mut().zip(&layout.used) {
-            let field = fields.get(at).copied().unwrap_or("");
-            let value = value(field, column, layout);
-            found += usize::from(value.is_some() && column.kind != Kind::Words);
-            column.values.push(value.unwrap_or(f64::NAN));
+        for (i, &at) in layout.used.iter().enumerate() {
+            let value = self.value(i, fields.get(at).copied().unwrap_or(""));
+            found += usize::from(value.is_some() && self.columns[i].kind != Kind::Words);
+            self.columns[i].values.push(value.unwrap_or(f64::NAN));
         }
         if found == 0 {
-            self.columns.iter_mut().for_each(|c| {
-                c.values.pop();
-            });
+            self.columns.iter_mut().for_each(|c| c.values.truncate(rows));
             if !fields.iter().all(|f| f.is_empty()) {
                 self.skipped.add(line);
             }
@@ -182,20 +209,70 @@ impl Reader<'_> {
         if extra || short {
             self.ragged.add(line);
         }
-        if found < self.columns.len() {
-            for ((column, missing), &at) in self.columns.iter().zip(&mut self.missing).zip(&layout.used) {
-                if column.kind != Kind::Words && column.values.last().is_some_and(|v| v.is_nan()) {
-                    if missing.tally.count == 0 {
-                        missing.text = fields.get(at).copied().unwrap_or("").chars().take(24).collect();
-                    }
-                    missing.tally.add(line);
-                }
+        if layout.used.len() < layout.fields
+            && fields
+                .iter()
+                .take(layout.fields)
+                .enumerate()
+                .any(|(at, f)| !f.is_empty() && !layout.used.contains(&at))
+        {
+            self.again = Some(Again::Fields);
+        }
+        for (i, &at) in layout.used.iter().enumerate() {
+            if self.columns[i].values[rows].is_nan() {
+                self.note_missing(i, line, fields.get(at).copied().unwrap_or(""));
             }
         }
     }
 
-    fn finish(self, repairs: &mut Vec<Repair>) -> Read {
-        let names: Vec<String> = self.layout.names.iter().map(|n| n.name.clone()).collect();
+    fn note_missing(&mut self, i: usize, line: usize, field: &str) {
+        let missing = &mut self.missing[i];
+        if field.is_empty() {
+            missing.empty.add(line);
+            return;
+        }
+        if missing.unread.count == 0 {
+            missing.text = field.chars().take(SHOWN).collect();
+        }
+        missing.unread.add(line);
+        let column = &mut self.columns[i];
+        let row = column.values.len() - 1;
+        if column.kind == Kind::Number
+            && field.starts_with(char::is_alphabetic)
+            && let (Ok(row), Some(state)) = (u32::try_from(row), column.state(field))
+        {
+            column.strays.push((row, state));
+        }
+        if column.kind.is_stamp() && self.layout.ambiguous_dates && self.again.is_none() {
+            let other = self.layout.date_order.other();
+            if parse_stamp(field, other).is_some() {
+                self.again = Some(Again::Order(other));
+            }
+        }
+    }
+
+    fn value(&mut self, i: usize, field: &str) -> Option<f64> {
+        let column = &mut self.columns[i];
+        match column.kind {
+            _ if field.is_empty() => None,
+            Kind::Number => number::parse(field, self.layout.decimal).or_else(|| {
+                let (value, unit) = number::parse_quantity(field, self.layout.decimal)?;
+                let first = self.suffixes[i].get_or_insert_with(|| unit.to_owned());
+                // Of a column in V a value in mV is none of its numbers.
+                (first == unit).then_some(value)
+            }),
+            Kind::Words => column.state(field).map(f64::from),
+            Kind::Full | Kind::Date | Kind::Clock => {
+                let stamp = self.stamps[i].read(field.as_bytes())?;
+                if let Stamp::Full { zone_s: Some(zone_s), .. } = stamp {
+                    column.zone_s.get_or_insert(zone_s);
+                }
+                Some(stamp.seconds())
+            }
+        }
+    }
+
+    fn finish(mut self, repairs: &mut Vec<Repair>) -> Read {
         if self.skipped.count > 0 {
             repairs.push(Repair::SkippedLines { count: self.skipped.count, line: self.skipped.line });
         }
@@ -203,78 +280,38 @@ impl Reader<'_> {
             let Tally { count, line } = self.ragged;
             repairs.push(Repair::RaggedRows { count, line, fields: self.layout.fields });
         }
-        for ((column, missing), name) in self.columns.iter().zip(self.missing).zip(&names) {
-            if column.is_text_only() {
-                repairs.push(Repair::TextColumn { column: name.clone() });
-            } else if missing.tally.count > 0 {
-                let Tally { count, line } = missing.tally;
-                repairs.push(Repair::MissingValues { column: name.clone(), count, line, text: missing.text });
+        for ((column, missing), suffix) in self.columns.iter_mut().zip(self.missing).zip(self.suffixes) {
+            if column.unit.is_none() {
+                column.unit = suffix;
+            }
+            let column_name = || column.name.clone();
+            if missing.unread.count > 0 {
+                let Tally { count, line } = missing.unread;
+                repairs.push(Repair::MissingValues {
+                    column: column_name(),
+                    count,
+                    line,
+                    text: missing.text,
+                });
+            }
+            if missing.empty.count > 0 && !column.is_text_only() {
+                let Tally { count, line } = missing.empty;
+                repairs.push(Repair::MissingValues {
+                    column: column_name(),
+                    count,
+                    line,
+                    text: String::new(),
+                });
             }
         }
-        if self.layout.ambiguous_dates {
+        let order_told = self.stamps.iter().any(|s| s.day_first || s.month_first);
+        if self.layout.ambiguous_dates && !order_told {
             repairs.push(Repair::AmbiguousDates);
         }
-        let units = self.layout.names.iter().map(|n| n.unit.clone()).collect();
-        Read { columns: self.columns, names, units, lines: self.lines }
-    }
-}
-
-fn value(field: &str, column: &mut ReadColumn, layout: &Layout) -> Option<f64> {
-    match column.kind {
-        Kind::Number => number::parse(field, layout.decimal),
-        Kind::Words => {
-            if field.is_empty() {
-                return None;
-            }
-            if let Some(i) = column.states.iter().position(|s| s == field) {
-                return Some(i as f64);
-            }
-            if column.states.len() <= MOST_STATES {
-                column.states.push(field.to_owned());
-            }
-            Some(column.states.len() as f64 - 1.0)
+        Read {
+            columns: self.columns,
+            lines: self.lines,
+            stated_sample_time_s: self.layout.stated_sample_time_s,
         }
-        Kind::Full | Kind::Date | Kind::Clock => match parse_stamp(field, layout.date_order)? {
-            Stamp::Full(s) | Stamp::Date(s) | Stamp::Clock(s) => Some(s),
-        },
-    }
-}
-
-fn kinds(lines: &[&str], layout: &Layout) -> Vec<Kind> {
-    let stride = (lines.len() - layout.first_row) / SAMPLE + 1;
-    let mut fields = Vec::new();
-    let mut seen = vec![[0_usize; 5]; layout.used.len()];
-    for line in lines[layout.first_row..].iter().step_by(stride).filter(|line| !is_remark(line)) {
-        split(line, layout.separator, &mut fields);
-        for (counts, &at) in seen.iter_mut().zip(&layout.used) {
-            let Some(field) = fields.get(at).filter(|f| !f.is_empty()) else { continue };
-            let kind = if number::parse(field, layout.decimal).is_some() {
-                Kind::Number
-            } else {
-                match parse_stamp(field, layout.date_order) {
-                    Some(Stamp::Full(_)) => Kind::Full,
-                    Some(Stamp::Date(_)) => Kind::Date,
-                    Some(Stamp::Clock(_)) => Kind::Clock,
-                    None => Kind::Words,
-                }
-            };
-            counts[kind as usize] += 1;
-        }
-    }
-    seen.iter().map(|counts| judge(*counts)).collect()
-}
-
-/// A column with any fair share of numbers is one of numbers; its words ("Bad") are missing values.
-fn judge(counts: [usize; 5]) -> Kind {
-    let total: usize = counts.iter().sum();
-    let order = [Kind::Full, Kind::Date, Kind::Clock];
-    let most = order.into_iter().max_by_key(|k| counts[*k as usize]).unwrap_or(Kind::Full);
-    if counts[Kind::Number as usize] * 5 >= total {
-        Kind::Number
-    } else if counts[most as usize] * 2 > total {
-        // A midnight written without its time of day is still a full stamp among others.
-        if most == Kind::Date && counts[Kind::Full as usize] > 0 { Kind::Full } else { most }
-    } else {
-        Kind::Words
     }
 }

@@ -12,29 +12,78 @@ pub(super) const SEPARATORS: [Separator; 6] = [
     Separator::Blanks,
 ];
 
-/// Puts the fields of a line into `fields`, which is emptied first.
-pub(super) fn split<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) {
-    fields.clear();
-    if line.contains('"') && separator != Separator::Blanks {
-        return split_quoted(line, separator, fields);
+impl Separator {
+    /// The byte it is, where it is a single one.
+    pub(super) fn byte(self) -> Option<u8> {
+        match self {
+            Self::Tab => Some(b'\t'),
+            Self::Semicolon => Some(b';'),
+            Self::Comma => Some(b','),
+            Self::Bar => Some(b'|'),
+            Self::DoubleBar | Self::Blanks => None,
+        }
     }
-    match separator {
-        Separator::Tab => split_at(line, b'\t', fields),
-        Separator::Semicolon => split_at(line, b';', fields),
-        Separator::Comma => split_at(line, b',', fields),
-        Separator::Bar => split_at(line, b'|', fields),
-        Separator::DoubleBar => fields.extend(line.split("||").map(clean)),
-        Separator::Blanks => fields.extend(line.split_whitespace().map(clean)),
+}
+
+/// How lines fall into fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Dialect {
+    pub separator: Separator,
+    /// A serial monitor's stamp and arrow stand before the row: `12:30:05.250 -> 23.5,40`.
+    pub arrow: bool,
+    /// Each field has its name: `T1:23.5` or `T1=23.5`.
+    pub labelled: bool,
+}
+
+impl Dialect {
+    /// Whether rows are nothing but fields and separators.
+    pub fn is_plain(self) -> bool {
+        !self.arrow && !self.labelled
     }
+
+    /// Puts the fields of a line into `fields`, which is emptied first.
+    pub fn split<'a>(self, line: &'a str, fields: &mut Vec<&'a str>) {
+        fields.clear();
+        let mut rest = line;
+        if self.arrow
+            && let Some((stamp, row)) = arrow(line)
+        {
+            fields.push(clean(stamp));
+            rest = row;
+        }
+        if rest.contains('"') && self.separator != Separator::Blanks {
+            split_quoted(rest, self.separator, fields);
+        } else {
+            match self.separator {
+                Separator::DoubleBar => fields.extend(rest.split("||").map(clean)),
+                Separator::Blanks => fields.extend(rest.split_whitespace().map(clean)),
+                other => split_at(rest, other.byte().unwrap_or(b','), fields),
+            }
+        }
+        if self.labelled {
+            fields.iter_mut().for_each(|field| *field = labelled(field).map_or(*field, |(_, value)| value));
+        }
+    }
+}
+
+/// A serial monitor's stamp and the row behind its arrow.
+pub(super) fn arrow(line: &str) -> Option<(&str, &str)> {
+    line.split_once("->").filter(|(stamp, _)| stamp.len() <= 32 && stamp.contains(':'))
+}
+
+/// Name and value of a field that has both.
+pub(super) fn labelled(field: &str) -> Option<(&str, &str)> {
+    let (name, value) = field.rsplit_once([':', '='])?;
+    let (name, value) = (name.trim(), value.trim());
+    let numeric = value.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.'));
+    (name.starts_with(char::is_alphabetic) && numeric).then_some((name, value))
 }
 
 fn split_at<'a>(line: &'a str, mark: u8, fields: &mut Vec<&'a str>) {
     let mut start = 0;
-    for (i, b) in line.bytes().enumerate() {
-        if b == mark {
-            fields.push(clean(&line[start..i]));
-            start = i + 1;
-        }
+    for i in memchr::memchr_iter(mark, line.as_bytes()) {
+        fields.push(clean(&line[start..i]));
+        start = i + 1;
     }
     fields.push(clean(&line[start..]));
 }
@@ -63,16 +112,20 @@ fn split_quoted<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a st
     fields.push(clean(&line[start..]));
 }
 
-fn clean(field: &str) -> &str {
-    let needs = |b: Option<u8>| b.is_some_and(|b| b <= b' ' || b >= 0x80 || b == b'"' || b == b'\'');
+/// A field without blanks, marks and quotes around it.
+pub(super) fn clean(field: &str) -> &str {
+    let needs = |b: Option<u8>| b.is_some_and(|b| b <= b' ' || b >= 0x80 || matches!(b, b'"' | b'\'' | b'='));
     let bytes = field.as_bytes();
     if !needs(bytes.first().copied()) && !needs(bytes.last().copied()) {
         return field;
     }
-    let field = field.trim_matches(|c: char| c.is_whitespace() || c == '\u{feff}' || c == '\u{1a}');
+    let blank = |c: char| c.is_whitespace() || matches!(c, '\u{feff}' | '\u{1a}' | '\0');
+    let field = field.trim_matches(blank);
+    // ="0012" keeps a spreadsheet from reading a number.
+    let field = field.strip_prefix('=').filter(|f| f.starts_with('"')).unwrap_or(field);
     for quote in ['"', '\''] {
         if field.len() >= 2 && field.starts_with(quote) && field.ends_with(quote) {
-            return field[1..field.len() - 1].trim();
+            return field[1..field.len() - 1].trim_matches(blank);
         }
     }
     field

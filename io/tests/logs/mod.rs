@@ -43,3 +43,22 @@ pub fn for_each_log(mut visit: impl FnMut(&str, &[u8])) -> usize {
     }
     folder().map_or(0, |folder| walk(&folder, &mut visit))
 }
+
+/// The folder and every log in it, sorted; `None` where there is no folder.
+pub fn log_paths() -> Option<(PathBuf, Vec<PathBuf>)> {
+    fn walk(at: &Path, found: &mut Vec<PathBuf>) {
+        let Ok(entries) = std::fs::read_dir(at) else { return };
+        for path in entries.flatten().map(|e| e.path()) {
+            if path.is_dir() {
+                walk(&path, found);
+            } else if path.extension().is_none_or(|e| e != "md") {
+                found.push(path);
+            }
+        }
+    }
+    let folder = folder()?;
+    let mut found = Vec::new();
+    walk(&folder, &mut found);
+    found.sort();
+    Some((folder, found))
+}

@@ -18,7 +18,7 @@ pub(super) fn of(
     log: &ImportedLog,
     mut warnings: Vec<String>,
 ) -> Answer {
-    let repairs: Vec<String> = log.report.repairs.iter().map(ToString::to_string).collect();
+    let repairs: Vec<String> = crate::cli::logs::repairs(&log.report);
     let usable = study.has_model();
     if let Ok(choice) = &study.choice {
         warnings.extend(choice.chosen().verdicts.iter().skip(1).map(ToString::to_string));

@@ -2,15 +2,16 @@
 
 mod answer;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vasos_engine::identify::{
     Disturbance, Drift, FitError, FitOptions, FitProblem, LoopRecord, ModeColumn, ModelFit, Structure,
     StudyOptions, study_loop,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
-use vasos_io::log::{ImportOptions, ImportedLog, import_log};
+use vasos_io::log::ImportedLog;
 
+use super::logs::Reading;
 use super::{Answer, Refusal};
 
 /// A fit as JSON.
@@ -37,8 +38,9 @@ A stretch with one step of the MV between two rests also gets the estimates of t
 With a setpoint and an automatic mode the gains of the controller at work are read from the log as well.
 Exit status 1: the log can be read, but no model can be told from it.")]
 pub struct Arguments {
-    /// Log file: CSV, TSV or the like.
-    log: PathBuf,
+    /// Log file: text with separators, a workbook, Parquet or a recording; several become one log.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
     /// Process variable.
     #[arg(long, value_name = "COL")]
     pv: Option<String>,
@@ -54,12 +56,8 @@ pub struct Arguments {
     /// Measured disturbance: another input of the PV; may be given several times.
     #[arg(long, value_name = "COL")]
     disturbance: Vec<String>,
-    /// Time column, where the proposal is wrong.
-    #[arg(long, value_name = "COL")]
-    time: Option<String>,
-    /// Sample time in seconds, for a log without a time column.
-    #[arg(long, value_name = "S")]
-    sample_time: Option<f64>,
+    #[command(flatten)]
+    reading: Reading,
     /// Start of the stretch, in seconds since the first row.
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     from: Option<f64>,
@@ -102,7 +100,7 @@ struct Chosen {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let options = study_options(arguments)?;
     let drift = drift(&arguments.drift)?;
-    let log = import(arguments)?;
+    let log = arguments.reading.open(&arguments.logs)?;
     let chosen = choose(arguments, &log)?;
     let stretch = Stretch::of(arguments, &log.table, &chosen)?;
     let fit_options = FitOptions {
@@ -165,15 +163,6 @@ fn drift(name: &str) -> Result<Drift, Refusal> {
         "auto" => Ok(Drift::Auto),
         _ => Err(Refusal(format!("there is no drift '{name}': choose none, linear or auto"))),
     }
-}
-
-fn import(arguments: &Arguments) -> Result<ImportedLog, Refusal> {
-    let path: &Path = &arguments.log;
-    let bytes = std::fs::read(path)
-        .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let options = ImportOptions { sample_time_s: arguments.sample_time, time_column: arguments.time.clone() };
-    import_log(&name, &bytes, &options).map_err(|error| Refusal(format!("{}: {error}", path.display())))
 }
 
 fn choose(arguments: &Arguments, log: &ImportedLog) -> Result<Chosen, Refusal> {
