@@ -88,19 +88,24 @@ fn val_optima_of_a_brute_force_search() {
     let golden: serde_json::Value =
         serde_json::from_str(include_str!("../../assets/golden/optima_brute_force.json")).expect("json");
     let number = |v: &serde_json::Value| v.as_f64().unwrap_or(FREE);
-    let list = |v: &serde_json::Value| -> Vec<f64> { v.as_array().expect("numbers").iter().map(number).collect() };
+    let list =
+        |v: &serde_json::Value| -> Vec<f64> { v.as_array().expect("numbers").iter().map(number).collect() };
     let cases = golden["cases"].as_array().expect("cases");
     assert!(cases.len() >= 50, "{}", cases.len());
     for case in cases {
         let model = rational(&list(&case["num"]), &list(&case["den"]), number(&case["L_s"]));
         let l = &case["limits"];
         let limits = LoopLimits { ms: number(&l["Ms"]), mt: number(&l["Mt"]), ju: number(&l["Ju"]) };
-        let objective = Objective::from_id(case["objective"].as_str().expect("a word")).expect("an objective");
+        let objective =
+            Objective::from_id(case["objective"].as_str().expect("a word")).expect("an objective");
         let found = solve(&model, Wanted::Pi, objective, limits).expect("an optimum");
         check(&model, &limits, &found);
         let (ours, theirs) = (found.value.abs(), number(&case["optimum"]["value"]).abs());
-        let (worse, tolerance) =
-            if objective == Objective::Jv { (ours / theirs - 1.0, 2e-3) } else { (theirs / ours - 1.0, 2e-3) };
+        let (worse, tolerance) = if objective == Objective::Jv {
+            (ours / theirs - 1.0, 2e-3)
+        } else {
+            (theirs / ours - 1.0, 2e-3)
+        };
         assert!(worse.abs() < tolerance, "{} {limits:?} {objective:?}: {ours} {theirs}", case["case"]);
     }
 }

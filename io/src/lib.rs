@@ -4,6 +4,7 @@
 //! an error that says what to do. The original files are never written to.
 
 pub mod experiment;
+pub mod frequency_response;
 pub mod log;
 pub mod recording;
 pub mod rig;

@@ -20,6 +20,7 @@ use vasos_engine::signal::ExpressionError;
 use vasos_engine::sim::{CompareError, ScenarioError};
 use vasos_engine::tune::optimum::OptimumError;
 use vasos_engine::tune::{RuleError, RuleWarning, registry};
+use vasos_io::frequency_response::FrequencyFileError;
 use vasos_io::log::{ImportError, Repair};
 use vasos_io::recording::{RecordingError, RecordingTrouble};
 use vasos_io::rig::FileError;
@@ -218,6 +219,7 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("RunError", vec![Box::new(RunError::Rig(RigError::NoTank))]),
         ("GainsError", boxed(GainsError::samples())),
         ("FormError", boxed(FormError::samples())),
+        ("FrequencyFileError", boxed(FrequencyFileError::samples())),
         ("FrequencyResponseError", boxed(FrequencyResponseError::samples())),
         ("OptimumError", boxed(OptimumError::samples())),
         ("ModelError", boxed(ModelError::samples())),

@@ -1,8 +1,10 @@
 //! `vasos analyze`: what a controller is worth on a model.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{analyze, step_figures};
+use vasos_engine::analyze::{StepFigures, analyze, analyze_measured, step_figures};
+use vasos_engine::control::ParallelGains;
 use vasos_engine::tune::ControllerKind;
+use vasos_io::frequency_response::read_frequency_response;
 
 use super::json::{self, shown, table};
 use super::{Answer, Refusal, parse};
@@ -14,8 +16,12 @@ use super::{Answer, Refusal, parse};
 )]
 pub struct Arguments {
     /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..
-    #[arg(long, allow_hyphen_values = true)]
-    model: String,
+    #[arg(long, required_unless_present = "response", allow_hyphen_values = true)]
+    model: Option<String>,
+    /// A measured frequency response in place of a model: CSV with omega_rad_s, re, im, or what vasos excite --sine
+    /// --json prints.
+    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    response: Option<std::path::PathBuf>,
     /// Gains of the ideal form: Kc=..[,Ti=..][,Td=..][,N=..]; without Ti no integral action, N is 10.
     #[arg(long, allow_hyphen_values = true)]
     gains: String,
@@ -25,17 +31,28 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
-    let model = parse::model(&arguments.model).map_err(Refusal::of)?;
     let gains = parse::gains(&arguments.gains).map_err(Refusal::of)?;
-    let analysis = analyze(&model, &gains);
-    let figures = step_figures(&model, &gains, &analysis);
+    let (described, analysis, figures) = match (&arguments.model, &arguments.response) {
+        (Some(model), _) => {
+            let model = parse::model(model).map_err(Refusal::of)?;
+            let analysis = analyze(&model, &gains);
+            (json::model(&model), analysis, step_figures(&model, &gains, &analysis))
+        }
+        (None, Some(path)) => {
+            let response = read_frequency_response(path).map_err(Refusal::of)?;
+            let parallel = ParallelGains::from(gains);
+            let analysis = analyze_measured(&response, &parallel).map_err(Refusal::of)?;
+            (json::response(&response), analysis, StepFigures::default())
+        }
+        (None, None) => return Err(Refusal("give --model or --response".to_owned())),
+    };
     if arguments.json {
         let mut result = Map::new();
         json::add_gains(&mut result, ControllerKind::of(&gains), Some(&gains));
         json::add_analysis(&mut result, &analysis);
         json::add_figures(&mut result, &analysis, &figures);
         json::add_remarks(&mut result, true, &[]);
-        let whole = json!({"model": json::model(&model), "result": Value::Object(result)});
+        let whole = json!({"model": described, "result": Value::Object(result)});
         return Ok(Answer::done(json::text(&whole)));
     }
     if !analysis.stable {

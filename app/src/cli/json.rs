@@ -1,7 +1,7 @@
 //! JSON of models and results, and the text beside it. Keys are an interface: stable, documented in the io spec.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{Analysis, StepFigures};
+use vasos_engine::analyze::{Analysis, FrequencyResponse, StepFigures};
 use vasos_engine::control::PidGains;
 use vasos_engine::explain::number;
 use vasos_engine::model::ProcessModel;
@@ -28,6 +28,15 @@ pub fn model(model: &ProcessModel) -> Value {
             json!({"structure": "rational", "num": m.num, "den": m.den, "L_s": m.dead_time_s})
         }
     }
+}
+
+/// A measured frequency response by its range.
+pub fn response(response: &FrequencyResponse) -> Value {
+    json!({
+        "structure": "frequency_response",
+        "omega_rad_s": [response.first_omega(), response.last_omega()],
+        "points": response.points(),
+    })
 }
 
 /// Adds gains of the ideal form and Ki, Kd of the parallel one; without gains every number is null.

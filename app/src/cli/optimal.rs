@@ -1,13 +1,14 @@
 //! `vasos tune --optimal`: the best gains under limits, with their certificate.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{Analysis, OpenLoop, analyze_loop};
+use vasos_engine::analyze::{Analysis, OpenLoop, analyze_loop, analyze_measured};
 use vasos_engine::control::ParallelGains;
 use vasos_engine::model::ProcessModel;
 use vasos_engine::tune::optimum::{
     DerivativeFilter, LoopLimits, Objective, Optimum, OptimumError, OptimumProblem, Process, Wanted, optimum,
 };
 use vasos_engine::tune::{ControllerKind, SetpointSide, setpoint_side};
+use vasos_io::frequency_response::read_frequency_response;
 
 use super::json::{self, shown, table};
 use super::tune::{self, Arguments};
@@ -24,7 +25,11 @@ struct Question {
 
 pub(super) fn run(arguments: &Arguments, models: &[ProcessModel]) -> Result<Answer, Refusal> {
     let question = question(arguments)?;
-    let processes: Vec<Process> = models.iter().cloned().map(Process::Model).collect();
+    let mut processes: Vec<Process> = models.iter().cloned().map(Process::Model).collect();
+    for path in &arguments.response {
+        processes.push(Process::Measured(read_frequency_response(path).map_err(Refusal::of)?));
+    }
+    let processes = processes;
     let found = optimum(&OptimumProblem {
         processes: &processes,
         wanted: question.wanted,
@@ -32,8 +37,8 @@ pub(super) fn run(arguments: &Arguments, models: &[ProcessModel]) -> Result<Answ
         limits: question.limits,
     });
     match found {
-        Ok(found) => Ok(answer(arguments.json, models, &question, &found)),
-        Err(error) if is_answer(&error) => Ok(refusal(arguments.json, models, &question, &error)),
+        Ok(found) => Ok(answer(arguments.json, &processes, &question, &found)),
+        Err(error) if is_answer(&error) => Ok(refusal(arguments.json, &processes, &question, &error)),
         Err(error) => Err(Refusal::of(error)),
     }
 }
@@ -92,9 +97,13 @@ fn is_answer(error: &OptimumError) -> bool {
 }
 
 /// The worst of the loops, measure by measure.
-fn worst(models: &[ProcessModel], gains: &ParallelGains) -> Analysis {
-    let all: Vec<Analysis> =
-        models.iter().map(|model| analyze_loop(&OpenLoop::of_parallel(model, gains))).collect();
+fn worst(processes: &[Process], gains: &ParallelGains) -> Analysis {
+    let of = |process: &Process| match process {
+        Process::Model(model) => analyze_loop(&OpenLoop::of_parallel(model, gains)),
+        // The optimum stands on a response that is long enough.
+        Process::Measured(response) => analyze_measured(response, gains).unwrap_or_default(),
+    };
+    let all: Vec<Analysis> = processes.iter().map(of).collect();
     let by = |of: fn(&Analysis) -> Option<f64>, pick: fn(f64, f64) -> f64| {
         all.iter().map(of).reduce(|a, b| a.zip(b).map(|(a, b)| pick(a, b))).flatten()
     };
@@ -133,11 +142,15 @@ fn limits_json(limits: &LoopLimits) -> Value {
     json!({"Ms": limits.ms, "Mt": limits.mt, "Ju": limits.ju})
 }
 
-fn whole(models: &[ProcessModel], result: Value) -> String {
+fn whole(processes: &[Process], result: Value) -> String {
+    let described = |process: &Process| match process {
+        Process::Model(model) => json::model(model),
+        Process::Measured(response) => json::response(response),
+    };
     let mut to = Map::new();
-    to.insert("model".into(), json::model(&models[0]));
-    if models.len() > 1 {
-        to.insert("models".into(), models.iter().map(json::model).collect());
+    to.insert("model".into(), described(&processes[0]));
+    if processes.len() > 1 {
+        to.insert("models".into(), processes.iter().map(described).collect());
     }
     to.insert("results".into(), json!([result]));
     json::text(&Value::Object(to))
@@ -158,17 +171,20 @@ fn warnings(gains: &ParallelGains) -> Vec<String> {
     found
 }
 
-fn answer(as_json: bool, models: &[ProcessModel], question: &Question, found: &Optimum) -> Answer {
-    let analysis = worst(models, &found.gains);
-    let weights = question
-        .overshoot_percent
-        .map(|p| (p, setpoint_side(&OpenLoop::of_parallel(&models[0], &found.gains), p)));
+fn answer(as_json: bool, processes: &[Process], question: &Question, found: &Optimum) -> Answer {
+    let analysis = worst(processes, &found.gains);
+    let first = processes.iter().find_map(|p| match p {
+        Process::Model(model) => Some(OpenLoop::of_parallel(model, &found.gains)),
+        Process::Measured(_) => None,
+    });
+    let side = |percent: f64| first.as_ref().and_then(|open| setpoint_side(open, percent));
+    let weights = question.overshoot_percent.map(|percent| (percent, side(percent)));
     let mut remarks = warnings(&found.gains);
     if let Some((percent, None)) = weights {
         remarks.push(format!("no weight and no filter of the setpoint holds the overshoot at {percent} %"));
     }
     let text = if as_json {
-        whole(models, result(question, found, &analysis, weights.and_then(|w| w.1), &remarks))
+        whole(processes, result(question, found, &analysis, weights.and_then(|w| w.1), &remarks))
     } else {
         as_table(question, found, &analysis, weights.and_then(|w| w.1), &remarks)
     };
@@ -249,7 +265,7 @@ fn as_table(
     format!("{}{bound}\n{}", table(&rows), remarks.join("\n"))
 }
 
-fn refusal(as_json: bool, models: &[ProcessModel], question: &Question, error: &OptimumError) -> Answer {
+fn refusal(as_json: bool, processes: &[Process], question: &Question, error: &OptimumError) -> Answer {
     let reason = error.to_string();
     if !as_json {
         return Answer { text: String::new(), remarks: vec![reason], status: 1 };
@@ -269,5 +285,5 @@ fn refusal(as_json: bool, models: &[ProcessModel], question: &Question, error: &
         floor.insert(limit.to_string(), json!(value));
     }
     to.insert("floor".into(), Value::Object(floor));
-    Answer { text: whole(models, Value::Object(to)), remarks: vec![reason], status: 1 }
+    Answer { text: whole(processes, Value::Object(to)), remarks: vec![reason], status: 1 }
 }

@@ -23,8 +23,12 @@ Exit status 1: the rule has no answer for this model, or no controller meets the
 pub struct Arguments {
     /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..; several
     /// times for an optimum over the worst of them.
-    #[arg(long, required = true, allow_hyphen_values = true)]
+    #[arg(long, required_unless_present = "response", allow_hyphen_values = true)]
     model: Vec<String>,
+    /// A measured frequency response in place of a model, for an optimum: CSV with omega_rad_s, re, im, or what vasos
+    /// excite --sine --json prints; several times for the worst of them.
+    #[arg(long, value_name = "FILE", requires = "optimal")]
+    pub(super) response: Vec<std::path::PathBuf>,
     /// Name of a rule, or all.
     #[arg(long, required_unless_present = "optimal", conflicts_with = "optimal")]
     rule: Option<String>,

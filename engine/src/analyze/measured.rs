@@ -144,6 +144,12 @@ impl FrequencyResponse {
         Ok(Self { log_omega, log_gain, phase_rad, low })
     }
 
+    /// Number of measured points.
+    #[must_use]
+    pub fn points(&self) -> usize {
+        self.log_omega.len()
+    }
+
     /// First measured frequency in rad/s.
     #[must_use]
     pub fn first_omega(&self) -> f64 {

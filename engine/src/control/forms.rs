@@ -34,6 +34,13 @@ pub struct ParallelGains {
     pub tf_s: f64,
 }
 
+impl From<PidGains> for ParallelGains {
+    /// Kc, Kc/Ti, Kc·Td, Td/N.
+    fn from(ideal: PidGains) -> Self {
+        ideal_to_parallel(&ideal)
+    }
+}
+
 impl ParallelGains {
     /// C(jω), ω > 0 in rad/s.
     #[must_use]

@@ -141,8 +141,7 @@ fn band(
         state.band = None;
         return (None, vec![]);
     };
-    let g = &row.gains;
-    let gains = ParallelGains { kp: g.kc, ki: g.ki(), kd: g.kd(), tf_s: g.td_s / g.n };
+    let gains = ParallelGains::from(row.gains);
     let excitation = if state.load { Excitation::Load } else { Excitation::Setpoint };
     let question = Question::Spread { fit, gains, excitation, horizon_s };
     let mut actions = vec![];
