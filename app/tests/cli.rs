@@ -300,7 +300,6 @@ fn bad_input_ends_with_2_and_says_what_to_do() {
         (&["tune", "--model", MODEL, "--rule", "magic"][..], "amigo"),
         (&["tune", "--model", MODEL, "--rule", "amigo", "--controller", "x"][..], "pid"),
         (&["tune", "--model", MODEL, "--rule", "lambda", "--tau-c", "-1"][..], "-1"),
-        (&["tune", "--model", MODEL, "--optimal", "--ms", "1.4"][..], "not available yet"),
         (&["analyze", "--model", MODEL, "--gains", "Kc=0"][..], "Kc = 0"),
         (&["identify", &missing][..], "nothing.csv"),
         (&["identify", binary][..], "export"),
