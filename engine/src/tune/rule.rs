@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::formulas::Settings;
+use super::formulas::text::formula_text;
 use super::shape::{Shape, half_rule};
 use super::{ControllerKind, RuleError, RuleWarning, Ultimate, ultimate};
 use crate::control::PidGains;
@@ -146,6 +147,13 @@ pub(super) const ISIMC_PID: &str = "isimc_pid";
 pub(super) const SIMC: &str = "simc";
 
 impl Rule {
+    /// The formula for a first-order model, or from Ku and Pu, as it is printed, with a = τ/(K·θ), r = θ/τ and λ for τc; `None`
+    /// where the rule gives such a controller for second-order models only, or not at all.
+    #[must_use]
+    pub fn formula_text(&self, kind: ControllerKind) -> Option<&'static str> {
+        formula_text(self.id, kind)
+    }
+
     /// Whether the user may choose τc or λ.
     #[must_use]
     pub fn has_free_time_constant(&self) -> bool {

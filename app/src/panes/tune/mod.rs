@@ -256,7 +256,9 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
     };
     let colour = if flagged { p.caution } else { p.weak };
     let line = ui.add(egui::Label::new(RichText::new(&source).size(theme::SMALL).color(colour)).truncate());
-    line.on_hover_text(format!("{source}\n{}", row.source));
+    let formula = find_rule(row.rule, row.kind).and_then(|rule| rule.formula_text(row.kind));
+    let formula = formula.map_or_else(String::new, |f| format!("\n{f}\n{}", tr!("tune.formula_symbols")));
+    line.on_hover_text(format!("{source}\n{}{formula}", row.source));
     ui.horizontal_wrapped(|ui| {
         let tag = view.snapshot.loops.get(view.focus).map(|l| l.tag.clone());
         let usable = row.gains.ti_s.is_finite() && row.analysis.stable;

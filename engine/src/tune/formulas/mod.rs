@@ -7,6 +7,7 @@ pub(super) mod closed_loop;
 pub(super) mod first_order;
 pub(super) mod integrating;
 pub(super) mod second_order;
+pub(super) mod text;
 
 /// Kc in MV units per PV unit, Ti and Td in seconds; Ti = ∞ without integral, Td = 0 without derivative action.
 #[derive(Debug, Clone, Copy, PartialEq)]
