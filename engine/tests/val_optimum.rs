@@ -266,6 +266,23 @@ fn limits_that_no_controller_meets_are_answered_with_the_floor() {
     check(&lag, &held, &solve(&lag, Wanted::Pi, Objective::Jv, held).expect("an optimum"));
 }
 
+/// Two lags without dead time take any gain from a PID: what was a search that gave up says so.
+#[test]
+fn a_pid_that_nothing_holds_is_called_unbounded() {
+    let pid = Wanted::Pid(DerivativeFilter::Ratio(10.0));
+    for den in [
+        [1.882_807_785_371_377_4, 23.237_069_923_970_143, 1.0],
+        [14.790_444_696_352_413, 10.548_433_055_194_364, 1.0],
+    ] {
+        let model = rational(&[2.0], &den, 0.0);
+        let limits = LoopLimits { ms: 2.4, ..LoopLimits::DEFAULT };
+        let refused = solve(&model, pid, Objective::Jv, limits);
+        assert_eq!(refused, Err(OptimumError::Unbounded), "{den:?}");
+        let held = LoopLimits { ju: 20.0, ..limits };
+        check(&model, &held, &solve(&model, pid, Objective::Jv, held).expect("an optimum"));
+    }
+}
+
 #[test]
 fn limits_that_are_no_limits_are_refused() {
     let model = ProcessModel::Fopdt(Fopdt::new(1.0, 8.0, 1.0).expect("a model"));

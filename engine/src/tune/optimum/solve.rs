@@ -50,9 +50,14 @@ fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, Optimum
     if let Some(refused) = floor::of_ju(&solver) {
         return Err(refused);
     }
-    match problem.objective {
+    let found = match problem.objective {
         Objective::Jv | Objective::MaxKi => solver.solve(problem.objective),
         Objective::IaeLoad | Objective::IaeSetpoint => by_simulation::solve(&mut solver, problem.objective),
+    };
+    match found {
+        // With derivative action two lags without dead time take any gain: the search runs after it until it gives up.
+        Err(OptimumError::NotCertified { .. }) if solver.takes_any_gain() => Err(OptimumError::Unbounded),
+        found => found,
     }
 }
 
@@ -87,6 +92,13 @@ impl<'a> Solver<'a> {
             (0..family.plants.len()).for_each(|plant| family.refine(plant));
         }
         Self { family, search: GainSearch::default(), wanted: problem.wanted, limits }
+    }
+
+    /// Whether nothing in processes and limits holds the gain of a controller with derivative action.
+    fn takes_any_gain(&self) -> bool {
+        let free = |p: &Plant<'_>| p.dead_time_s == 0.0 && p.excess <= 2;
+        let derivative = self.wanted != Wanted::Pi;
+        derivative && self.limits.ju.is_infinite() && self.family.plants.iter().all(free)
     }
 
     pub fn controller(&self) -> &'static str {
