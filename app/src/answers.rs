@@ -101,7 +101,7 @@ pub enum Reply {
     /// The band; none where the fit leaves a parameter open.
     Spread(Option<TuningSpread>),
     /// The run, or why it is not possible.
-    Trial(Result<TrialRun, ScenarioError>),
+    Trial(Box<Result<TrialRun, ScenarioError>>),
 }
 
 impl Question {
@@ -134,7 +134,7 @@ impl Question {
                 let draws = fit.draws(DRAWS, SEED);
                 Reply::Spread(draws.and_then(|d| tuning_spread(&d, gains, *excitation, *horizon_s)))
             }
-            Self::Trial { network, trial } => Reply::Trial(run_trial(network, trial)),
+            Self::Trial { network, trial } => Reply::Trial(Box::new(run_trial(network, trial))),
         }
     }
 }

@@ -11,6 +11,7 @@ use vasos_io::recording::{Recording, RecordingOptions};
 use super::jobs::Outcome;
 use super::{Workbench, files, tiles};
 use crate::action::Action;
+use crate::answers::Question;
 use crate::journal::{self, Weight};
 use crate::panes::identify;
 use crate::traces::LogTrace;
@@ -90,15 +91,18 @@ impl Workbench {
             }
             Action::ExportTrend => self.export_trend(),
             Action::ClearLog => self.journal.clear(),
-            Action::Ask(question) => {
-                if self.answers.begins(&question) {
-                    self.beside.start("answer", move || {
-                        let reply = question.answer();
-                        Outcome::Answered(question, Box::new(reply))
-                    });
-                }
-            }
+            Action::Ask(question) => self.work_out(question),
             Action::Copy(words) => ctx.copy_text(words),
+        }
+    }
+
+    /// Works a question out beside the window, unless it is known or under way.
+    fn work_out(&mut self, question: Box<Question>) {
+        if self.answers.begins(&question) {
+            self.beside.start("answer", move || {
+                let reply = question.answer();
+                Outcome::Answered(question, Box::new(reply))
+            });
         }
     }
 

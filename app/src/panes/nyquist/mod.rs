@@ -61,7 +61,6 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         );
         return vec![];
     };
-    let p = theme::palette(ui);
     ui.horizontal_wrapped(|ui| {
         egui::ComboBox::from_id_salt("nyquist_view")
             .selected_text(tr!(VIEWS[state.shown]))
@@ -75,18 +74,26 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     });
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
     match state.shown {
-        1..=3 => {
+        0 => return nyquist(ui, view, state, model, row, present),
+        4 => pole_map::ui(ui, model, row),
+        shown => {
             let tunings = over_frequency::Tunings { model, row, present };
-            over_frequency::ui(ui, state.shown, &tunings, &mut state.curves);
-            return vec![];
+            over_frequency::ui(ui, shown, &tunings, &mut state.curves);
         }
-        4 => {
-            pole_map::ui(ui, model, row);
-            return vec![];
-        }
-        _ => {}
     }
-    let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
+    vec![]
+}
+
+/// The Nyquist curve.
+fn nyquist(
+    ui: &mut egui::Ui,
+    view: &View,
+    state: &mut State,
+    model: &ProcessModel,
+    row: &Row,
+    present: Option<&Row>,
+) -> Vec<Action> {
+    let p = theme::palette(ui);
     let curve = state.curve(model, &row.gains);
     let ghost = present.map(|r| state.curve(model, &r.gains));
     let names = [tr!("nyquist.loop"), tr!("rules.present")];

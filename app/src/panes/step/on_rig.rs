@@ -3,7 +3,7 @@
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, Plot, PlotPoints};
 use vasos_engine::control::PidTuning;
-use vasos_engine::sim::{Trial, TrialRun};
+use vasos_engine::sim::{ScenarioError, Trial, TrialRun};
 
 use crate::action::Action;
 use crate::answers::{Question, Reply};
@@ -40,16 +40,17 @@ pub(super) fn ui(ui: &mut egui::Ui, view: &View, row: &Row) -> Vec<Action> {
         known
     };
     let (found, ghost) = (ask(question), other.and_then(&mut ask));
-    let ghost = match ghost.as_deref() {
-        Some(Reply::Trial(Ok(run))) => Some(run),
-        _ => None,
-    };
-    match found.as_deref() {
-        Some(Reply::Trial(Ok(run))) => draw(ui, view, run, ghost),
-        Some(Reply::Trial(Err(error))) => weak(ui, i18n::say(error)),
-        _ => weak(ui, tr!("tune.pending")),
+    let ghost = trial_of(ghost.as_deref()).and_then(|run| run.as_ref().ok());
+    match trial_of(found.as_deref()) {
+        Some(Ok(run)) => draw(ui, view, run, ghost),
+        Some(Err(error)) => weak(ui, i18n::say(error)),
+        None => weak(ui, tr!("tune.pending")),
     }
     actions
+}
+
+fn trial_of(reply: Option<&Reply>) -> Option<&Result<TrialRun, ScenarioError>> {
+    if let Some(Reply::Trial(run)) = reply { Some(run) } else { None }
 }
 
 /// The trial of a row; `None` where the model's units are not the loop's.
