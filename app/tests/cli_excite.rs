@@ -99,7 +99,7 @@ fn what_cannot_be_is_refused_in_words() {
         (&["stad", "--loop", "LIC-02", "--relay", "3"][..], "smaller move"),
         (&["stad", "--loop", "LIC-09", "--relay", "0.3"], "LIC-09"),
         (&["nowhere", "--loop", "LIC-02", "--relay", "0.3"], "nowhere"),
-        (&["stad", "--loop", "LIC-02", "--relay", "-0.3"], "unexpected argument"),
+        (&["stad", "--loop", "LIC-02", "--relay", "-0.3"], "it must be > 0"),
         (&["stad", "--loop", "LIC-02", "--relay", "0.3", "--cycles", "1"], "cycles"),
         (&["stad", "--loop", "LIC-02"], "required"),
         (&["stad", "--loop", "LIC-02", "--relay", "0.3", "--step", "0.1"], "cannot be used"),
