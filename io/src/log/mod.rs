@@ -8,6 +8,7 @@ mod axis;
 mod behaviour;
 mod decode;
 mod error;
+mod fingerprint;
 mod layout;
 mod names;
 mod number;
@@ -20,6 +21,7 @@ mod stamp;
 use vasos_engine::signal::{LogColumn, LogTable};
 
 pub use error::ImportError;
+pub use fingerprint::sha256;
 pub use report::{Decimal, Encoding, ImportReport, Repair, Roles, Separator, TimeKind};
 
 /// What the user may say about a file ahead of its import; all of it can be found out.
