@@ -171,7 +171,7 @@ impl std::fmt::Display for Advice {
             ),
             Self::Restless { mv_move, percent } => write!(
                 f,
-                "what the model leaves of the PV, noise for the most part, will move the MV by about ±{}, {} % of its range in this log; give a limit with --ju if that wears the valve",
+                "noise of the PV will move the MV by about ±{}, {} % of its range in this log; give a limit with --ju if that wears the valve",
                 n(mv_move),
                 whole(percent)
             ),

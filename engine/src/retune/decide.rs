@@ -228,16 +228,17 @@ fn decide(
         return;
     }
     let mut after = Vec::new();
-    if let (Some(Swing::Sine { period_s }), Some(present)) = (swing, present)
-        && !is_its_own(&present.analysis)
-    {
-        let (now, then) = (passes(model, &present.gains, period_s), passes(model, &new.gains, period_s));
+    if let (Some(Swing::Sine { period_s }), Some(present)) = (swing, present) {
+        let [now, then] = [present, new].map(|c| passes(model, &c.gains, period_s));
         let advice = Advice::FromOutside { period_s, now, then };
-        if then > SMALLER * now {
+        let is_its_own = is_its_own(&present.analysis, now);
+        if !is_its_own && then > SMALLER * now {
             out.advice = vec![advice];
             return;
         }
-        after.push(advice);
+        if !is_its_own {
+            after.push(advice);
+        }
     }
     let gain = present.and_then(|p| gain(new, p)).map(|g| g.1);
     let (first, recommended) = match (present, gain) {
@@ -294,7 +295,10 @@ fn remarks_on_choice(out: &Retuning, fit: &ModelFit, signs: &LoopSigns) -> Vec<A
             remarks.push(Advice::LargeMove { factor });
         }
     }
-    let moved = 2.0 * choice.analysis.ju.unwrap_or(choice.gains.kp.abs()) * fit.mse.sqrt();
+    // What neighbours share is slow, and the integral takes care of it: the rest is noise.
+    let shared = fit.tests.autocorrelation.first().copied().unwrap_or(0.0).clamp(0.0, 1.0);
+    let noise = (fit.mse * (1.0 - shared)).sqrt();
+    let moved = 2.0 * choice.analysis.ju.unwrap_or(choice.gains.kp.abs()) * noise;
     if moved > RESTLESS * signs.mv_range && signs.mv_range > 0.0 {
         remarks.push(Advice::Restless { mv_move: moved, percent: 100.0 * moved / signs.mv_range });
     }

@@ -182,7 +182,8 @@ pub(super) fn text(outcome: &Outcome) -> String {
     }
     if let Some((measure, percent)) = retuning.gain() {
         let name = if measure == "Jv" { "Jv" } else { "IAE of a load" };
-        out.push_str(&format!("{name} against the present tuning: {} % less\n", number(percent)));
+        let way = if percent < 0.0 { "more" } else { "less" };
+        out.push_str(&format!("{name} against the present tuning: {} % {way}\n", number(percent.abs())));
     }
     for line in outcome.warnings.iter().chain(&outcome.repairs) {
         out.push_str(&format!("note: {line}\n"));
