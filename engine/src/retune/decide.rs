@@ -304,3 +304,84 @@ fn remarks_on_choice(out: &Retuning, fit: &ModelFit, signs: &LoopSigns) -> Vec<A
     }
     remarks
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::PidGains;
+    use crate::identify::{FitProblem, LoopRecord, StudyOptions, study_loop};
+    use crate::tune::optimum::LoopLimits;
+
+    /// A first-order process, K = 2, T = 40 s, dead time 4 s, under PI with a moving setpoint; a row a second.
+    fn log(rows: usize, noise: f64, kc: f64, ti_s: f64) -> [Vec<f64>; 4] {
+        let decay = (-1.0f64 / 40.0).exp();
+        let (mut level, mut integral, mut state) = (0.0f64, 0.0, 7u64);
+        let [mut time, mut pv, mut sp, mut mv]: [Vec<f64>; 4] = Default::default();
+        for k in 0..rows {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let uniform = (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            let setpoint = f64::from(u8::from(k / 200 % 2 == 1));
+            let seen = level + noise * uniform;
+            integral += kc / ti_s * (setpoint - seen);
+            mv.push(kc * (setpoint - seen) + integral);
+            (time.push(k as f64), pv.push(seen), sp.push(setpoint));
+            let arrives = 2.0 * if k >= 4 { mv[k - 4] } else { 0.0 };
+            level = arrives + (level - arrives) * decay;
+        }
+        [time, pv, sp, mv]
+    }
+
+    fn retuned(rows: usize, noise: f64, present: (f64, f64), options: &RetuneOptions) -> Retuning {
+        let [time, pv, sp, mv] = log(rows, noise, present.0, present.1);
+        let record = LoopRecord { problem: FitProblem::new(&time, &pv, &mv), sp: Some(&sp), mode: None };
+        let start = std::time::Instant::now();
+        let study = study_loop(&record, &StudyOptions::default()).expect("a study");
+        let studied = start.elapsed();
+        let out = retune(&study, &LoopSigns::of(&time, &mv, Some(&sp)), options).expect("an answer");
+        println!("{rows} rows: study {studied:?}, retuning {:?}", start.elapsed() - studied);
+        out
+    }
+
+    #[test]
+    fn the_optimum_keeps_its_limits_and_says_what_it_gains() {
+        let options = RetuneOptions::default();
+        let out = retuned(10_000, 0.02, (0.5, 60.0), &options);
+        assert_eq!(out.choice().map(|c| c.rule), Some(CandidateRule::Optimal), "{:?}", out.advice);
+        assert!(out.choice().and_then(|c| c.analysis.ms).expect("stable") <= 1.4 * (1.0 + 1e-8));
+        assert!(out.gain().expect("a gain").1 > 30.0, "{:?}", out.gain());
+        assert_eq!(out, retuned(10_000, 0.02, (0.5, 60.0), &options));
+    }
+
+    #[test]
+    fn a_model_that_is_barely_known_is_tuned_for_with_others_as_likely() {
+        let loose = RetuneOptions {
+            limits: LoopLimits { ms: 1.9, ..LoopLimits::DEFAULT },
+            ..RetuneOptions::default()
+        };
+        let out = retuned(400, 2.0, (0.5, 60.0), &loose);
+        let family = out.candidates.iter().any(|c| c.rule == CandidateRule::OptimalFamily);
+        let said = out.advice.iter().any(|a| matches!(a, Advice::Uncertain { .. } | Advice::NoModel(_)));
+        assert!(said && (family || out.model.is_none()), "{:?}", out.advice);
+    }
+
+    #[test]
+    fn a_limit_that_nothing_meets_is_an_answer() {
+        let options = RetuneOptions {
+            limits: LoopLimits { ju: 0.1, ..LoopLimits::DEFAULT },
+            present: Some(PidGains::pi(0.5, 60.0)),
+            ..RetuneOptions::default()
+        };
+        let out = retuned(800, 0.02, (0.5, 60.0), &options);
+        assert!(
+            matches!(out.advice[0], Advice::NoOptimum(_)) && out.recommended.is_none(),
+            "{:?}",
+            out.advice
+        );
+        assert!(out.present().is_some() && out.candidates.len() == 3);
+        let wrong = RetuneOptions { limits: LoopLimits { ms: 0.9, ..LoopLimits::DEFAULT }, ..options };
+        let [time, pv, sp, mv] = log(800, 0.02, 0.5, 60.0);
+        let record = LoopRecord { problem: FitProblem::new(&time, &pv, &mv), sp: Some(&sp), mode: None };
+        let study = study_loop(&record, &StudyOptions::default()).expect("a study");
+        assert!(retune(&study, &LoopSigns::of(&time, &mv, None), &wrong).is_err());
+    }
+}

@@ -46,7 +46,7 @@ pub(super) fn svg(chart: &Chart) -> String {
             chart.y.range,
             reach.iter().map(|p| p.1),
             chart.y.scale,
-            (chart.height / 38.0) as usize,
+            ((chart.height / 38.0) as usize).max(4),
         ),
     };
     let height = top + chart.height + BELOW;

@@ -117,12 +117,10 @@ pub(super) fn action(gains: &PidGains) -> &'static str {
 
 /// Name of a candidate for people.
 pub(super) fn title(one: &Candidate) -> String {
-    let name = match one.rule.id() {
-        "optimal" => "optimal".to_owned(),
-        "optimal_family" => "optimal, worst of 12 models".to_owned(),
-        id => id.to_owned(),
-    };
-    format!("{name} {}", one.controller)
+    match one.rule.id() {
+        "optimal_family" => format!("optimal {}, worst of 12", one.controller),
+        id => format!("{id} {}", one.controller),
+    }
 }
 
 /// Kc, Ti, Td and what they are worth, in the order of the table's head.
