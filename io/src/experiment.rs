@@ -57,6 +57,11 @@ pub const EXPERIMENTS: &[Embedded] = embedded![
     "uff_ki_sweep",
     "uff_effect_table",
     "uff_on_off",
+    "fic18_tables",
+    "fic18_figure_6",
+    "fic18_figure_10",
+    "fic18_figure_11",
+    "fic18_optimum",
 ];
 
 /// An experiment of the program by its id.

@@ -15,6 +15,7 @@ use vasos_engine::identify::grey_box::{GreyBoxError, GreyBoxVerdict};
 use vasos_engine::identify::{FitError, FitVerdict, ReactionCurveError, RecordFinding};
 use vasos_engine::model::{ModelError, ReduceError, StateSpaceError};
 use vasos_engine::plant::{LinearError, RigError};
+use vasos_engine::retune::Advice;
 use vasos_engine::session::{Alarm, CommandError};
 use vasos_engine::signal::ExpressionError;
 use vasos_engine::sim::{CompareError, ScenarioError};
@@ -235,6 +236,7 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("GreyBoxError", boxed(GreyBoxError::samples())),
         ("GreyBoxVerdict", boxed(GreyBoxVerdict::samples())),
         ("RecordFinding", boxed(RecordFinding::samples())),
+        ("Advice", boxed(Advice::samples())),
         ("ExpressionError", boxed(ExpressionError::samples())),
         ("RuleError", boxed(RuleError::samples())),
         ("RuleWarning", boxed(RuleWarning::samples())),

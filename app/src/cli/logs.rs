@@ -15,7 +15,7 @@ use super::{Answer, Refusal};
 const PREVIEW_ROWS: usize = 5;
 
 /// What a user may say about a log that is to be read.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(super) struct Reading {
     /// Time column, where the proposal is wrong.
     #[arg(long, value_name = "COL")]

@@ -12,12 +12,14 @@ mod experiment;
 mod fit_plant;
 mod identify;
 mod json;
+mod log_columns;
 mod logs;
 mod model;
 mod optimal;
 pub mod parse;
 mod parse_gains;
 mod point;
+mod retune;
 mod simulate;
 mod tune;
 
@@ -45,6 +47,7 @@ Examples:
   vasos tune --model K=4.9,T=152,L=2 --optimal --ms 1.4 --controller pi
   vasos analyze --model K=4.9,T=152,L=2 --gains Kc=1.8,Ti=152
   vasos controller convert --gains Kc=2,Ti=60,Td=10 --from ideal --to series
+  vasos retune loop.csv -o report.html
   vasos experiment stad_figure_7";
 
 /// Process control workbench: simulate, identify, tune, analyse.
@@ -83,8 +86,8 @@ pub enum Command {
     Controller(controller::Arguments),
     /// Run a prepared experiment, and say whether it came out as expected.
     Experiment(experiment::Arguments),
-    /// Not available yet: identify, tune, compare and report in one go.
-    Retune(Later),
+    /// Identify, tune, compare and report in one go: one log, or a folder of them.
+    Retune(Box<retune::Arguments>),
     /// Not available yet: serve a simulated rig to other programs.
     Serve(Later),
     /// Not available yet: record a live rig.
@@ -171,7 +174,7 @@ pub fn run(cli: Cli) -> CliOutcome {
         Command::Analyze(arguments) => analyze::run(arguments),
         Command::Controller(arguments) => controller::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments),
-        Command::Retune(_) => Err(Refusal::later("vasos retune")),
+        Command::Retune(arguments) => retune::run(arguments),
         Command::Serve(_) => Err(Refusal::later("vasos serve")),
         Command::Record(_) => Err(Refusal::later("vasos record")),
         Command::Replay(_) => Err(Refusal::later("vasos replay")),
@@ -225,7 +228,7 @@ mod tests {
 
     #[test]
     fn what_is_to_come_says_so() {
-        for command in ["retune", "serve", "record", "replay"] {
+        for command in ["serve", "record", "replay"] {
             assert_eq!(outcome(&[command, "--list", "x"]), CliOutcome::Exit(2), "{command}");
         }
     }

@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &Arguments, models: &[ProcessModel]) -> Result<Answ
     });
     match found {
         Ok(found) => Ok(answer(arguments.json, &processes, &question, &found)),
-        Err(error) if is_answer(&error) => Ok(refusal(arguments.json, &processes, &question, &error)),
+        Err(error) if error.is_answer() => Ok(refusal(arguments.json, &processes, &question, &error)),
         Err(error) => Err(Refusal::of(error)),
     }
 }
@@ -82,18 +82,6 @@ fn question(arguments: &Arguments) -> Result<Question, Refusal> {
         return Err(Refusal(format!("--overshoot {percent} is not usable: give percent from 0 to 100")));
     }
     Ok(Question { kind, wanted, objective, limits, overshoot_percent: arguments.overshoot })
-}
-
-/// Whether an error is the answer to the question, rather than a question that cannot be asked.
-fn is_answer(error: &OptimumError) -> bool {
-    matches!(
-        error,
-        OptimumError::Infeasible { .. }
-            | OptimumError::InfeasibleTogether { .. }
-            | OptimumError::NotStabilisable { .. }
-            | OptimumError::Unbounded
-            | OptimumError::NotCertified { .. }
-    )
 }
 
 /// The worst of the loops, measure by measure.

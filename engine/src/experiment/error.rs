@@ -6,6 +6,7 @@ use crate::explain::Explain;
 use crate::model::{ModelError, StateSpaceError};
 use crate::plant::RigError;
 use crate::sim::{CompareError, ScenarioError};
+use crate::tune::optimum::OptimumError;
 
 /// Item of an experiment's file that an error is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +42,9 @@ pub enum RunError {
     /// The input cannot be simulated.
     #[error(transparent)]
     Samples(#[from] StateSpaceError),
+    /// There are no best gains.
+    #[error(transparent)]
+    Optimum(#[from] OptimumError),
     /// The models cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
@@ -58,6 +62,7 @@ impl RunError {
             Self::Form(error) => error,
             Self::Gains(error) => error,
             Self::Samples(error) => error,
+            Self::Optimum(error) => error,
             Self::Compare(error) => error,
             Self::Metrics(error) => error,
         }
@@ -102,7 +107,7 @@ pub enum ExperimentError {
     },
     /// A run of no kind, or of several.
     #[error(
-        "the run {run} is {count} things: give it exactly one of scenario, scenario_file, loop, step and models"
+        "the run {run} is {count} things: give it exactly one of scenario, scenario_file, loop, step, analysis, optimum and models"
     )]
     Kind {
         /// Id of the run.

@@ -3,8 +3,9 @@
 //! An [`ExperimentSpec`] is what a file says; [`Experiment`] is the same checked, with the rigs it runs on.
 //! [`run_experiment`] gives an [`ExperimentRun`]: the columns of every run, the tables drawn from them, and each
 //! expectation with what was found. A run is a scenario on a rig, a law at its sample time on a linear process, a
-//! continuous step response, or models side by side.
+//! continuous step response, the analysis of given or of the best gains, or models side by side.
 
+mod analysis;
 mod check;
 mod error;
 mod linear_loop;
@@ -17,6 +18,7 @@ mod runner;
 mod spec;
 mod step;
 
+pub use analysis::{AnalysisRun, OptimumRun};
 pub use check::{CheckOutcome, CheckSpec, Expectation};
 pub use error::{ExperimentError, Place, RunError};
 pub use linear_loop::{LoopEvent, LoopRun};

@@ -84,6 +84,8 @@ fn check_run(
         run.scenario_file.is_some(),
         run.closed_loop.is_some(),
         run.step.is_some(),
+        run.analysis.is_some(),
+        run.optimum.is_some(),
         run.models.is_some(),
     ];
     let count = kinds.iter().filter(|kind| **kind).count();

@@ -69,6 +69,10 @@ fn carry_out(
         let (time_s, columns, rest) = step.run()?;
         final_value = rest;
         Some((time_s, columns))
+    } else if let Some(analysis) = &run.analysis {
+        Some(analysis.run()?)
+    } else if let Some(optimum) = &run.optimum {
+        Some(optimum.run()?)
     } else if let Some((models, network)) = run.models.as_ref().and_then(|m| Some((m, rig(&m.rig)?))) {
         Some(models.run(network)?)
     } else {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::analysis::{AnalysisRun, OptimumRun};
 use super::check::CheckSpec;
 use super::linear_loop::LoopRun;
 use super::measure::Measure;
@@ -40,7 +41,8 @@ pub struct ExperimentSpec {
     pub checks: Vec<CheckSpec>,
 }
 
-/// One run, or one for each value of a sweep; exactly one of `scenario`, `scenario_file`, `loop`, `step`, `models`.
+/// One run, or one for each value of a sweep; exactly one of `scenario`, `scenario_file`, `loop`, `step`, `analysis`,
+/// `optimum`, `models`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunSpec {
@@ -59,6 +61,10 @@ pub struct RunSpec {
     pub closed_loop: Option<LoopRun>,
     /// A continuous step response.
     pub step: Option<StepRun>,
+    /// What given gains are worth.
+    pub analysis: Option<AnalysisRun>,
+    /// The best gains under limits, and what they are worth.
+    pub optimum: Option<OptimumRun>,
     /// Models side by side.
     pub models: Option<ModelsRun>,
     /// Which value of which sweep this is, once the sweep is unrolled.

@@ -25,6 +25,6 @@ pub use kind::ControllerKind;
 pub use registry::{find_rule, registry, tune_all};
 pub use rule::{Aim, Purpose, RatioRange, Rule, RuleOptions, Tuning};
 pub use setpoint_side::{SetpointSide, setpoint_side};
-pub use spread::{Quantiles, TuningSpread, tuning_spread};
+pub use spread::{Quantiles, RobustnessSpread, TuningSpread, robustness_spread, tuning_spread};
 pub use ultimate::{Ultimate, ultimate};
 pub use warning::RuleWarning;

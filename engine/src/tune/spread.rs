@@ -55,6 +55,35 @@ impl TuningSpread {
     }
 }
 
+/// Robustness of one tuning on many models.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobustnessSpread {
+    /// Number of models.
+    pub models: usize,
+    /// How many of their loops are unstable.
+    pub unstable: usize,
+    /// Ms; that of an unstable loop is ∞.
+    pub ms: Quantiles,
+}
+
+impl RobustnessSpread {
+    /// Share of unstable loops.
+    #[must_use]
+    pub fn unstable_share(&self) -> f64 {
+        self.unstable as f64 / self.models as f64
+    }
+}
+
+/// Ms of the same gains on all models: [`tuning_spread`] without its bands, an analysis a model. `None` without models.
+#[must_use]
+pub fn robustness_spread(models: &[ProcessModel], gains: &ParallelGains) -> Option<RobustnessSpread> {
+    let ms: Vec<Option<f64>> =
+        models.iter().map(|model| analyze_loop(&OpenLoop::of_parallel(model, gains))).map(|a| a.ms).collect();
+    let unstable = ms.iter().filter(|ms| ms.is_none()).count();
+    let ms = ms.into_iter().map(|ms| ms.unwrap_or(f64::INFINITY)).collect();
+    Some(RobustnessSpread { models: models.len(), unstable, ms: Quantiles::of(ms)? })
+}
+
 /// Times of the bands.
 const POINTS: usize = 160;
 

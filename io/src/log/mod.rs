@@ -17,6 +17,7 @@ mod calendar;
 mod decode;
 mod error;
 mod fast;
+mod fingerprint;
 mod header;
 mod join;
 mod kinds;
@@ -46,6 +47,7 @@ mod workbook;
 use vasos_engine::signal::LogTable;
 
 pub use error::ImportError;
+pub use fingerprint::sha256_of_file;
 pub use open::{import_log, open_log, open_logs};
 pub use repair::Repair;
 pub use report::{

@@ -7,9 +7,9 @@ use vasos_engine::identify::{
 };
 use vasos_io::log::ImportedLog;
 
-use super::Chosen;
 use crate::cli::Answer;
 use crate::cli::json::{self, shown, table};
+use crate::cli::log_columns::Chosen;
 
 pub(super) fn of(
     as_json: bool,
@@ -47,10 +47,7 @@ fn whole(chosen: &Chosen, study: &LoopStudy, repairs: &[String], warnings: &[Str
     let structure = |fit: &ModelFit| fit.structure.key();
     let choice = study.choice.as_ref().ok();
     json!({
-        "columns": {
-            "time": chosen.time, "pv": chosen.pv, "mv": chosen.mv, "sp": chosen.sp, "mode": chosen.mode,
-            "disturbances": chosen.disturbances,
-        },
+        "columns": chosen.json(),
         "models": models,
         "chosen": choice.filter(|c| c.chosen().is_usable()).map(|c| structure(c.chosen())),
         "runner_up": choice.and_then(|c| c.runner_up()).map(structure),
@@ -121,7 +118,7 @@ pub(super) fn model(fit: &ModelFit) -> Value {
     Value::Object(out)
 }
 
-fn controller(c: &ControllerFit) -> Value {
+pub(super) fn controller(c: &ControllerFit) -> Value {
     json!({
         "Kc": c.kc, "Ti_s": c.ti_s, "Td_s": c.td_s, "b": c.setpoint_weight, "r2": c.r2, "rows": c.rows,
         "interval_95": {"Kc": c.kc_interval_95, "Ti_s": c.ti_interval_95, "Td_s": c.td_interval_95},

@@ -106,6 +106,19 @@ pub enum OptimumError {
 }
 
 impl OptimumError {
+    /// Whether this is the answer to a question, rather than a question that cannot be asked.
+    #[must_use]
+    pub fn is_answer(&self) -> bool {
+        matches!(
+            self,
+            Self::Infeasible { .. }
+                | Self::InfeasibleTogether { .. }
+                | Self::NotStabilisable { .. }
+                | Self::Unbounded
+                | Self::NotCertified { .. }
+        )
+    }
+
     /// One of each kind, for the test that compares them with the translation files.
     #[must_use]
     pub fn samples() -> Vec<Self> {

@@ -1,0 +1,67 @@
+//! One log: read, studied, tuned for.
+
+use std::path::Path;
+
+use vasos_engine::identify::{LoopStudy, study_loop};
+use vasos_engine::retune::{Advice, LoopSigns, Retuning, retune};
+use vasos_io::log::sha256_of_file;
+
+use super::{Arguments, Task, answer, output, report};
+use crate::cli::log_columns::LoadedLog;
+use crate::cli::{Answer, Refusal};
+
+/// All that came of one log.
+pub(super) struct Outcome {
+    /// Name of the file, without its folder.
+    pub name: String,
+    pub sha256: String,
+    pub log: LoadedLog,
+    pub study: LoopStudy,
+    pub retuning: Retuning,
+    /// Everything to heed, the most important first; not the answer itself.
+    pub warnings: Vec<String>,
+    /// What was done to the file's text.
+    pub repairs: Vec<String>,
+}
+
+impl Outcome {
+    pub fn of(path: &Path, task: &Task) -> Result<Self, Refusal> {
+        let log = LoadedLog::read(&[path], task.columns)?;
+        let record = log.record();
+        let study = study_loop(&record, &task.columns.study_options()?).map_err(Refusal::of)?;
+        let signs = LoopSigns::of(record.problem.time_s, record.problem.mv, record.sp);
+        let retuning = retune(&study, &signs, &task.options).map_err(Refusal::of)?;
+        drop(record);
+        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let mut warnings: Vec<String> = retuning.advice.iter().skip(1).map(ToString::to_string).collect();
+        warnings.extend(study.findings.iter().filter(|f| f.is_warning()).map(ToString::to_string));
+        if let (Ok(choice), true) = (&study.choice, study.has_model()) {
+            let objections = choice.chosen().verdicts.iter().filter(|v| v.is_objection());
+            warnings.extend(objections.map(ToString::to_string));
+        }
+        warnings.extend(log.warnings());
+        let repairs = log.imported.report.repairs.iter().map(ToString::to_string).collect();
+        let sha256 = sha256_of_file(path)
+            .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
+        Ok(Self { name, sha256, log, study, retuning, warnings, repairs })
+    }
+
+    /// The answer in words.
+    pub fn reason(&self) -> String {
+        self.retuning.advice.first().map_or_else(String::new, Advice::to_string)
+    }
+}
+
+pub(super) fn run(arguments: &Arguments, task: &Task) -> Result<Answer, Refusal> {
+    if let Some(path) = &arguments.output {
+        output::check(path, &arguments.log)?;
+    }
+    let outcome = Outcome::of(&arguments.log, task)?;
+    if let Some(path) = &arguments.output {
+        output::write(path, &report::of(&outcome, task).html())?;
+    }
+    let status = u8::from(outcome.retuning.recommended.is_none());
+    let remarks = if status == 1 { vec![outcome.reason()] } else { vec![] };
+    let text = if arguments.json { answer::json(&outcome, task) } else { answer::text(&outcome) };
+    Ok(Answer { text, remarks, status })
+}
