@@ -324,7 +324,9 @@ mod tests {
             let seen = level + noise * uniform;
             integral += kc / ti_s * (setpoint - seen);
             mv.push(kc * (setpoint - seen) + integral);
-            (time.push(k as f64), pv.push(seen), sp.push(setpoint));
+            time.push(k as f64);
+            pv.push(seen);
+            sp.push(setpoint);
             let arrives = 2.0 * if k >= 4 { mv[k - 4] } else { 0.0 };
             level = arrives + (level - arrives) * decay;
         }

@@ -57,7 +57,6 @@ pub(in crate::tune) fn formula_text(rule: &str, kind: ControllerKind) -> Option<
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::model::{Fopdt, ProcessModel};
     use crate::tune::{RuleError, RuleOptions, Ultimate, registry};
 
