@@ -55,6 +55,7 @@ pub const EXPERIMENTS: &[Embedded] = embedded![
     "uff_pd_prediction",
     "uff_second_order",
     "uff_ki_sweep",
+    "uff_itae_reactor",
     "uff_effect_table",
     "uff_on_off",
     "fic18_tables",

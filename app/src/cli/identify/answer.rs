@@ -34,7 +34,9 @@ pub(super) fn of(
         let text = json::text(&whole(chosen, study, &repairs, &warnings));
         return Answer { text, remarks, status };
     }
-    let mut text = text(chosen, study);
+    // Figures of a fit that is no model must not stand alone in a pipe or a report.
+    let mut text = remarks.iter().map(|reason| format!("no model: {reason}\n")).collect::<String>()
+        + &text(chosen, study);
     text.push_str(&study.reaction_curve.as_ref().map_or_else(|_| String::new(), curve_text));
     for line in warnings.iter().chain(&repairs) {
         text.push_str(&format!("note: {line}\n"));
