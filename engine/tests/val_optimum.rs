@@ -80,7 +80,7 @@ fn val_largest_ki_of_the_test_batch() {
 }
 
 /// Fifteen processes under three sets of limits against a search that knows nothing of ours:
-/// golden/optima_brute_force.json, made by tests/peers/optima_brute_force.py on dense grids, good to 1e-3.
+/// golden/optima_brute_force.json, made by tests/peers/optima_brute_force.py on dense grids.
 ///
 /// Ours is never worse than its by more than that grid lets pass, and never better by more than it falls short.
 #[test]
@@ -101,12 +101,9 @@ fn val_optima_of_a_brute_force_search() {
         let found = solve(&model, Wanted::Pi, objective, limits).expect("an optimum");
         check(&model, &limits, &found);
         let (ours, theirs) = (found.value.abs(), number(&case["optimum"]["value"]).abs());
-        let (worse, tolerance) = if objective == Objective::Jv {
-            (ours / theirs - 1.0, 2e-3)
-        } else {
-            (theirs / ours - 1.0, 2e-3)
-        };
-        assert!(worse.abs() < tolerance, "{} {limits:?} {objective:?}: {ours} {theirs}", case["case"]);
+        let worse = if objective == Objective::Jv { ours / theirs - 1.0 } else { theirs / ours - 1.0 };
+        // Its last grid can fall short in a narrow corner, by 0.4 % with eight lags; ours may not.
+        assert!(worse < 1e-3 && worse > -8e-3, "{} {limits:?} {objective:?}: {ours} {theirs}", case["case"]);
     }
 }
 

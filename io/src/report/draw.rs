@@ -141,6 +141,10 @@ fn drawn(mark: &Mark, frame: &Frame) -> String {
         Mark::Circle { centre, radius, ink, .. } => {
             let (cx, cy) = frame.pixel(*centre);
             let (rx, ry) = frame.pixel((centre.0 + radius, centre.1 - radius));
+            // A circle has no shape on a logarithmic axis.
+            if !(cx.is_finite() && cy.is_finite() && rx.is_finite() && ry.is_finite()) {
+                return String::new();
+            }
             format!(
                 "<ellipse cx=\"{cx:.1}\" cy=\"{cy:.1}\" rx=\"{:.1}\" ry=\"{:.1}\" {}/>",
                 (rx - cx).abs(),
