@@ -79,5 +79,5 @@ fn the_experiment_example_reaches_its_outcome() {
         panic!("nobody cancels")
     };
     assert!(run.reached(), "{:#?}", run.checks);
-    assert_eq!(run.runs.len(), 6, "two of the sweep, one of each other kind, and a table");
+    assert_eq!(run.runs.len(), 8, "two of the sweep, one of each other kind, and a table");
 }

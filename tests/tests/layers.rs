@@ -146,7 +146,9 @@ fn no_code_steps_outside_the_compilers_checks() {
         for (number, line) in code(&text) {
             for (at, _) in line.match_indices(word) {
                 let (before, after) = (line[..at].chars().last(), line[at + word.len()..].chars().next());
-                assert!(!(alone(before) && alone(after)), "{}:{number}: {line}", path.display());
+                // The policy of a page has a word of its own that begins so.
+                let of_a_page = line[at + word.len()..].starts_with("-inline'");
+                assert!(of_a_page || !(alone(before) && alone(after)), "{}:{number}: {line}", path.display());
             }
         }
     }
