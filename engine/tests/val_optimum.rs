@@ -366,3 +366,50 @@ fn least_iae_is_a_valley() {
         }
     }
 }
+
+/// The least IAE of a setpoint step lies far from the least Jv: one search from there got stuck in valleys, so that a PID
+/// did worse than the PI, and a laxer limit worse than a stricter one; or it ended without an answer.
+#[test]
+fn more_freedom_is_never_worse_for_the_iae_either() {
+    let pid = Wanted::Pid(DerivativeFilter::Ratio(10.0));
+    for (k, t, l) in [(2.92, 11.9, 1.6), (4.9, 152.0, 2.0), (1.0, 1.0, 0.3)] {
+        let model = ProcessModel::Fopdt(Fopdt::new(k, t, l).expect("a model"));
+        let of = |wanted, ms| {
+            let limits = LoopLimits { ms, ..LoopLimits::DEFAULT };
+            solve(&model, wanted, Objective::IaeSetpoint, limits).expect("an optimum").value
+        };
+        let (pi, lax_pi, with_d, lax_with_d) =
+            (of(Wanted::Pi, 1.8), of(Wanted::Pi, 2.2), of(pid, 1.8), of(pid, 2.2));
+        assert!(with_d <= pi * (1.0 + 1e-3), "{k} {t} {l}: {pi} {with_d}");
+        assert!(lax_with_d <= lax_pi * (1.0 + 1e-3), "{k} {t} {l}: {lax_pi} {lax_with_d}");
+        assert!(lax_pi <= pi * 1.02, "{k} {t} {l}: {pi} {lax_pi}");
+    }
+    let model = ProcessModel::Fopdt(Fopdt::new(1.0, 1.0, 1.0).expect("a model"));
+    let held = LoopLimits { ms: 1.4, mt: FREE, ju: 5.0 };
+    check(&model, &held, &solve(&model, pid, Objective::IaeLoad, held).expect("an optimum"));
+}
+
+/// Long dead times have a second valley of Td far out; an independent search found these gains.
+#[test]
+fn a_pid_for_a_long_dead_time_takes_the_deeper_valley() {
+    let pid = Wanted::Pid(DerivativeFilter::Ratio(10.0));
+    for (model, jv) in
+        [(rational(&[1.0], &[1.0, 2.0, 1.0], 15.0), 27.665), (rational(&[1.0], &[1.0, 1.0], 8.0), 14.537)]
+    {
+        let found = solve(&model, pid, Objective::Jv, LoopLimits::DEFAULT).expect("an optimum");
+        check(&model, &LoopLimits::DEFAULT, &found);
+        assert!(found.value < jv * 1.002, "{} {jv}", found.value);
+    }
+}
+
+/// With two integrators in the loop |T| passes 1 somewhere: ∫ ln|T|/ω² dω ≥ 0.
+#[test]
+fn no_integrator_has_mt_1() {
+    let model = ProcessModel::Ipdt(Ipdt::new(1.0, 1.0).expect("a model"));
+    let limits = LoopLimits { ms: 1.6, mt: 1.0, ju: FREE };
+    let refused = solve(&model, Wanted::Pi, Objective::Jv, limits);
+    assert!(
+        matches!(refused, Err(OptimumError::Infeasible { limit: Limit::Mt, floor, .. }) if floor > 1.0),
+        "{refused:?}"
+    );
+}

@@ -14,49 +14,81 @@ use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_re
 
 /// Rounds of exact checks of the result.
 const ROUNDS: usize = 20;
-/// Share of the largest Ki at which the search starts.
-const START_SHARE: f64 = 0.9;
+/// Shares of the largest Ki at which searches start.
+const START_SHARES: [f64; 3] = [0.9, 0.5, 0.2];
 const SIMPLEX: Simplex = Simplex { step: 0.2, last_step: 2e-5, most_evaluations: 160 };
 
 /// Least IAE, from the least Jv on.
 pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Optimum, OptimumError> {
+    let wanted = solver.wanted;
     let start = solver.solve(Objective::Jv)?;
-    let sign = solver.family.sign;
-    let kp = sign * start.gains.kp;
-    // A pure integrator leaves nothing but Ki to choose.
-    if kp == 0.0 {
-        let value = iae(
-            solver,
-            objective,
-            &Candidate { lead: Lead::NONE, kp, ki: sign * start.gains.ki, value: 0.0 },
-        );
-        let certificate = Certificate { gap: None, ..start.certificate };
-        return Ok(Optimum { value, certificate, ..start });
-    }
-    let td_s = start.gains.kd / start.gains.kp;
-    let mut from = vec![kp.ln(), f64::ln(START_SHARE)];
-    let filter = match solver.wanted {
-        Wanted::Pid(filter) if td_s > 0.0 => {
-            from.push(td_s.ln());
-            if filter == DerivativeFilter::Free {
-                from.push((td_s / start.gains.tf_s).ln());
-            }
-            Some(filter)
+    let mut best = valued(solver, objective, start.clone());
+    let mut take = |found: Option<Optimum>| {
+        if let Some(found) = found.filter(|f| f.value < best.value) {
+            best = found;
         }
+    };
+    // Without derivative action first: a PID may do no worse.
+    if wanted != Wanted::Pi {
+        solver.wanted = Wanted::Pi;
+        let simple = solver.solve(Objective::Jv);
+        let found = simple.ok().and_then(|simple| searched(solver, objective, &simple));
+        solver.wanted = wanted;
+        take(found);
+    }
+    take(searched(solver, objective, &start));
+    Ok(best)
+}
+
+/// An optimum for another objective with its IAE.
+fn valued(solver: &Solver<'_>, objective: Objective, found: Optimum) -> Optimum {
+    let sign = solver.family.sign;
+    let lead = lead_of(&found);
+    let candidate = Candidate { lead, kp: sign * found.gains.kp, ki: sign * found.gains.ki, value: 0.0 };
+    let value = iae(solver, objective, &candidate);
+    Optimum { value, certificate: Certificate { gap: None, ..found.certificate }, ..found }
+}
+
+fn lead_of(found: &Optimum) -> Lead {
+    if found.gains.kd == 0.0 {
+        Lead::NONE
+    } else {
+        Lead { td_s: found.gains.kd / found.gains.kp, tf_s: found.gains.tf_s }
+    }
+}
+
+/// The best that simplexes from some shares of the largest Ki come to, certified; `None` for a pure integrator, which leaves
+/// nothing but Ki to choose, and where the exact analysis does not confirm it.
+fn searched(solver: &mut Solver<'_>, objective: Objective, start: &Optimum) -> Option<Optimum> {
+    let kp = solver.family.sign * start.gains.kp;
+    if kp == 0.0 {
+        return None;
+    }
+    let lead = lead_of(start);
+    let filter = match solver.wanted {
+        Wanted::Pid(filter) if lead.td_s > 0.0 => Some(filter),
         _ => None,
     };
     let mut best: Option<Candidate> = None;
-    let mut value = |x: &[f64]| {
-        let Some(candidate) = candidate_at(solver, filter, x) else { return f64::INFINITY };
-        let value = iae(solver, objective, &candidate);
-        if value.is_finite() && best.is_none_or(|b| value < b.value) {
-            best = Some(Candidate { value, ..candidate });
+    for share in START_SHARES {
+        let mut from = vec![kp.ln(), f64::ln(share)];
+        if filter.is_some() {
+            from.push(lead.td_s.ln());
         }
-        value
-    };
-    minimise(&SIMPLEX, &from, &mut value);
-    let found = best.ok_or(OptimumError::NotCertified { excess_percent: f64::NAN })?;
-    certified(solver, objective, found)
+        if filter == Some(DerivativeFilter::Free) {
+            from.push((lead.td_s / lead.tf_s).ln());
+        }
+        let mut value = |x: &[f64]| {
+            let Some(candidate) = candidate_at(solver, filter, x) else { return f64::INFINITY };
+            let value = iae(solver, objective, &candidate);
+            if value.is_finite() && best.is_none_or(|b| value < b.value) {
+                best = Some(Candidate { value, ..candidate });
+            }
+            value
+        };
+        minimise(&SIMPLEX, &from, &mut value);
+    }
+    certified(solver, objective, best?).ok()
 }
 
 /// ln Kp, ln of the share of the largest Ki, ln Td, ln N.
@@ -120,9 +152,13 @@ fn certified(
         solver.add(&check);
         let limits = solver.limits;
         let largest = solver.at_gain(Objective::MaxKi, &limits, last.lead, last.kp);
-        match largest {
-            Some(largest) if !unstable => last.ki = last.ki.min(largest.ki),
-            _ => last.kp *= 1.0 - 2.0 * excess.clamp(1e-9, 0.1),
+        let less = largest.map_or(0.0, |largest| last.ki.min(largest.ki));
+        // Where it is not Ki that the limit bears on, Kp goes down.
+        if !unstable && less > 0.0 && less < last.ki * (1.0 - 0.1 * excess) {
+            last.ki = less;
+        } else {
+            let share = 1.0 - 2.0 * excess.clamp(1e-9, 0.1);
+            (last.kp, last.ki) = (last.kp * share, last.ki * share);
         }
     }
     Err(OptimumError::NotCertified { excess_percent: 100.0 * excess })

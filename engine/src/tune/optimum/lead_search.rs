@@ -8,7 +8,8 @@ use super::valley::{Spot, valley};
 
 /// Td at which the search looks first, in units of 1/ω, ω the frequency at which the loop without derivative action
 /// comes nearest to −1.
-const TDS: [f64; 9] = [0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5];
+/// Long dead times have a second valley far out, where the derivative is the controller's main part.
+const TDS: [f64; 13] = [0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5, 9.0, 15.0, 25.0, 40.0];
 /// N at which it looks first where the filter is free, and its range.
 const RATIOS: [f64; 3] = [1.5, 6.0, 25.0];
 pub(super) const RATIO_RANGE: (f64, f64) = (1.0, 100.0);

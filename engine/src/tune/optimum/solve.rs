@@ -18,6 +18,8 @@ const LAST_STEPS: usize = 14;
 const CLOSE: f64 = 2e-6;
 /// Ms that no optimum passes, whatever the limit: beyond it a loop is all but unstable.
 pub(super) const LARGEST_MS: f64 = 8.0;
+/// How far above 1 a limit on Mt must lie for a process that integrates.
+const LEAST_MT: f64 = 1e-6;
 /// Limit on Ms from which on the points lie twice as close.
 const LAX_MS: f64 = 2.5;
 /// Searches on ever more of the points, and how well they must agree with all of them.
@@ -214,6 +216,11 @@ impl<'a> Solver<'a> {
 
     /// Least Jv or largest Ki; `None` where no gains meet the limits.
     pub fn within_limits(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
+        // Two integrators in the loop: ∫ ln|T|/ω² dω ≥ 0, so |T| passes 1 somewhere.
+        let integrates = self.family.plants.iter().any(|p| p.low.power < 0);
+        if integrates && self.limits.mt <= 1.0 + LEAST_MT {
+            return Ok(None);
+        }
         let mut known: Option<Candidate> = None;
         let mut excess = f64::INFINITY;
         for round in 1..=ROUNDS {
