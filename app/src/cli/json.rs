@@ -51,7 +51,8 @@ pub fn add_gains(to: &mut Map<String, Value>, kind: ControllerKind, gains: Optio
         ("Ki", with(PidGains::ki)),
         ("Kd", with(PidGains::kd)),
     ] {
-        to.insert(key.into(), json!(value));
+        // No −0, which a negative Kc makes of what is absent.
+        to.insert(key.into(), json!(value.map(|v| v + 0.0)));
     }
 }
 

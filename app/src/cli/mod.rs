@@ -187,7 +187,10 @@ fn say(answered: Result<Answer, Refusal>) -> u8 {
     match answered {
         Ok(answer) => {
             let mut out = std::io::stdout().lock();
-            drop(writeln!(out, "{}", answer.text.trim_end()).and_then(|()| out.flush()));
+            let text = answer.text.trim_end();
+            if !text.is_empty() {
+                drop(writeln!(out, "{text}").and_then(|()| out.flush()));
+            }
             for remark in answer.remarks {
                 drop(writeln!(std::io::stderr(), "vasos: {remark}"));
             }

@@ -120,7 +120,7 @@ fn add_gains(to: &mut Map<String, Value>, kind: ControllerKind, gains: &Parallel
         ("Td_s", Some(td_s)),
         ("N", (kd != 0.0).then_some(td_s / tf_s)),
         ("Ki", Some(ki)),
-        ("Kd", Some(kd)),
+        ("Kd", Some(kd + 0.0)),
     ] {
         to.insert(key.into(), json!(value));
     }

@@ -80,6 +80,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     if arguments.optimal {
         return optimal::run(arguments, &models);
     }
+    if arguments.overshoot.is_some() || arguments.filter.is_some() {
+        return Err(Refusal("--overshoot and --filter belong to --optimal: rules have their own".to_owned()));
+    }
     let [model] = models.as_slice() else {
         return Err(Refusal("rules take one model: leave one, or ask for --optimal".to_owned()));
     };

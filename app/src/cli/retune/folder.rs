@@ -14,7 +14,7 @@ use crate::cli::json::{self, shown, table};
 use crate::cli::{Answer, Refusal};
 
 /// Endings that logs have.
-const ENDINGS: [&str; 5] = ["csv", "tsv", "txt", "dat", "log"];
+const ENDINGS: [&str; 10] = ["csv", "tsv", "txt", "dat", "log", "xlsx", "xls", "ods", "parquet", "rrd"];
 
 /// What came of a log, the most to gain first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
