@@ -1,7 +1,7 @@
 //! `vasos tune --optimal`: the best gains under limits, with their certificate.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{Analysis, OpenLoop, analyze_loop, analyze_measured};
+use vasos_engine::analyze::{Analysis, OpenLoop};
 use vasos_engine::control::ParallelGains;
 use vasos_engine::model::ProcessModel;
 use vasos_engine::tune::optimum::{
@@ -86,11 +86,8 @@ fn question(arguments: &Arguments) -> Result<Question, Refusal> {
 
 /// The worst of the loops, measure by measure.
 fn worst(processes: &[Process], gains: &ParallelGains) -> Analysis {
-    let of = |process: &Process| match process {
-        Process::Model(model) => analyze_loop(&OpenLoop::of_parallel(model, gains)),
-        // The optimum stands on a response that is long enough.
-        Process::Measured(response) => analyze_measured(response, gains).unwrap_or_default(),
-    };
+    // The optimum stands on a response that is long enough.
+    let of = |process: &Process| process.analyze(gains).unwrap_or_default();
     let all: Vec<Analysis> = processes.iter().map(of).collect();
     let by = |of: fn(&Analysis) -> Option<f64>, pick: fn(f64, f64) -> f64| {
         all.iter().map(of).reduce(|a, b| a.zip(b).map(|(a, b)| pick(a, b))).flatten()

@@ -212,14 +212,7 @@ pub fn measured_peaks(
     gains: &ParallelGains,
 ) -> Result<Option<Peaks>, FrequencyResponseError> {
     let walked = Walk::new(response, gains);
-    let end = walked.points[walked.points.len() - 1];
-    if end.l.norm() >= 1.0 {
-        return Err(FrequencyResponseError::TooShort { gain: end.l.norm(), omega_rad_s: end.omega });
-    }
-    if !walked.is_stable() {
-        return Ok(None);
-    }
-    Ok(Some(walked.peaks()))
+    Ok(walked.is_known_stable()?.then(|| walked.peaks()))
 }
 
 /// The analysis of the loop of a measured process and a controller; an unstable loop has no measures.
@@ -230,8 +223,11 @@ pub fn analyze_measured(
     response: &FrequencyResponse,
     gains: &ParallelGains,
 ) -> Result<Analysis, FrequencyResponseError> {
-    let Some(peaks) = measured_peaks(response, gains)? else { return Ok(Analysis::default()) };
     let walked = Walk::new(response, gains);
+    if !walked.is_known_stable()? {
+        return Ok(Analysis::default());
+    }
+    let peaks = walked.peaks();
     let finite = |v: f64| Some(v).filter(|v| v.is_finite());
     let mut analysis = Analysis {
         stable: true,
@@ -273,6 +269,15 @@ impl<'a> Walk<'a> {
         let ParallelGains { kp, ki, .. } = *self.gains;
         let (power, controller) = if ki == 0.0 { (0, kp) } else { (-1, ki) };
         (power + self.response.low.power, controller * self.response.low.coefficient)
+    }
+
+    /// Whether the loop is stable, where the points reach far enough to tell.
+    fn is_known_stable(&self) -> Result<bool, FrequencyResponseError> {
+        let end = self.points[self.points.len() - 1];
+        if end.l.norm() >= 1.0 {
+            return Err(FrequencyResponseError::TooShort { gain: end.l.norm(), omega_rad_s: end.omega });
+        }
+        Ok(self.is_stable())
     }
 
     /// Whether 1 + L turns by π/2 for each integrator from ω → 0 to ∞, as a stable loop of a stable process does.

@@ -96,8 +96,7 @@ impl<'a> Family<'a> {
 
     /// The least Ju of any controller with integral action: 1/|G(0)|, 0 where every process integrates.
     pub fn least_ju(&self) -> f64 {
-        let of = |p: &Plant<'_>| if p.low.power == 0 { 1.0 / p.low.coefficient.abs() } else { 0.0 };
-        self.plants.iter().map(of).fold(0.0, f64::max)
+        self.plants.iter().map(Plant::least_ju).fold(0.0, f64::max)
     }
 
     /// Kp beyond which the limits at ω → ∞ are not met.
@@ -118,7 +117,7 @@ impl<'a> Family<'a> {
         largest
     }
 
-    /// Intervals of Kp ≥ 0 in which every loop is stable for Ki → 0⁺, and whether Kp = 0 belongs to the first.
+    /// Intervals of Kp ≥ 0 in which every loop is stable for Ki → 0⁺.
     ///
     /// Between two gains at which P(jω) Kp = −1 for some ω the number of unstable poles does not change, so one gain of
     /// each interval is tested.

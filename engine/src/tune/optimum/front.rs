@@ -1,8 +1,9 @@
 //! Trade-off fronts: what the objective can be for every value of one limit, the others as they are.
 
-use super::problem::{LoopLimits, Objective, OptimumProblem, Process};
+use super::points::Plant;
+use super::problem::{LoopLimits, Objective, OptimumProblem};
 use super::solve::optimum;
-use crate::analyze::{Analysis, OpenLoop, analyze_loop, analyze_measured, loop_figures};
+use crate::analyze::{Analysis, OpenLoop, loop_figures};
 use crate::control::ParallelGains;
 
 /// Two measures that are bought with each other.
@@ -74,22 +75,14 @@ fn ju_range(problem: &OptimumProblem<'_>) -> Option<(f64, f64)> {
     };
     let far = optimum(&OptimumProblem { limits, objective: Objective::Jv, ..*problem }).ok()?;
     let most = far.certificate.peaks.u.value;
-    let least = problem.processes.iter().map(least_ju).fold(JU_RANGE.0 * most, f64::max);
+    let least = problem.processes.iter().map(|p| Plant::new(p).least_ju()).fold(JU_RANGE.0 * most, f64::max);
     (most > least).then_some((least * (1.0 + 1e-6), most * JU_RANGE.1))
-}
-
-fn least_ju(process: &Process) -> f64 {
-    let low = super::points::Plant::new(process).low;
-    if low.power == 0 { 1.0 / low.coefficient.abs() } else { 0.0 }
 }
 
 fn point(problem: &OptimumProblem<'_>, trade_off: TradeOff) -> Option<FrontPoint> {
     let found = optimum(problem).ok()?;
     let limit = if trade_off == TradeOff::JvJu { problem.limits.ju } else { problem.limits.ms };
-    let analysis = match problem.processes.first()? {
-        Process::Model(model) => analyze_loop(&OpenLoop::of_parallel(model, &found.gains)),
-        Process::Measured(response) => analyze_measured(response, &found.gains).ok()?,
-    };
+    let analysis = problem.processes.first()?.analyze(&found.gains).ok()?;
     Some(FrontPoint { limit, gains: found.gains, value: found.value, analysis })
 }
 

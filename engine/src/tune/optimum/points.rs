@@ -124,6 +124,11 @@ impl<'a> Plant<'a> {
         }
     }
 
+    /// The least Ju of any controller with integral action, 1/|G(0)|; 0 where the process integrates.
+    pub fn least_ju(&self) -> f64 {
+        if self.low.power == 0 { 1.0 / self.low.coefficient.abs() } else { 0.0 }
+    }
+
     pub fn at_omega(&self, omega: f64) -> Complex64 {
         match (&self.bare, self.process) {
             (Some(bare), _) => bare.process_at_omega(omega),

@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::OptimumError;
-use crate::analyze::FrequencyResponse;
-use crate::control::PidGains;
+use crate::analyze::{
+    Analysis, FrequencyResponse, FrequencyResponseError, OpenLoop, analyze_loop, analyze_measured,
+};
+use crate::control::{ParallelGains, PidGains};
 use crate::model::ProcessModel;
 
 /// A process as the optimum sees it.
@@ -14,6 +16,19 @@ pub enum Process {
     Model(ProcessModel),
     /// A frequency response measured point by point.
     Measured(FrequencyResponse),
+}
+
+impl Process {
+    /// What gains of the parallel form are worth on it.
+    ///
+    /// # Errors
+    /// [`FrequencyResponseError`] for a measured response that ends too early to tell.
+    pub fn analyze(&self, gains: &ParallelGains) -> Result<Analysis, FrequencyResponseError> {
+        match self {
+            Self::Model(model) => Ok(analyze_loop(&OpenLoop::of_parallel(model, gains))),
+            Self::Measured(response) => analyze_measured(response, gains),
+        }
+    }
 }
 
 impl From<ProcessModel> for Process {
