@@ -9,6 +9,26 @@ use crate::answers::Question;
 use crate::i18n::Language;
 use crate::panes::PaneKind;
 
+/// A kind of file for tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Table {
+    /// Text, a row a line.
+    Csv,
+    /// Parquet, with units.
+    Parquet,
+}
+
+impl Table {
+    /// Ending of its files.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+        }
+    }
+}
+
 /// Something a pane, a menu or a key asks for.
 #[derive(Debug, Clone)]
 pub enum Action {
@@ -38,6 +58,14 @@ pub enum Action {
     AskFile,
     /// Open a file: a log or a rig.
     OpenFile(PathBuf),
+    /// Open several files as one log.
+    OpenLogs(Vec<PathBuf>),
+    /// Play a run of the recording that was opened.
+    PlayRun(usize),
+    /// Go to a time of the recording that is played, in seconds.
+    Seek(f64),
+    /// Show the recording that runs, or the last one, in Rerun's viewer.
+    OpenInRerun,
     /// Begin or end a recording.
     ToggleRecording,
     /// Record every run from the start.
@@ -64,8 +92,8 @@ pub enum Action {
     Maximise(PaneKind),
     /// Panes as at the first start.
     ResetLayout,
-    /// Save the trend's samples in view as CSV.
-    ExportTrend,
+    /// Save the run's samples, as CSV or Parquet.
+    ExportTrend(Table),
     /// Empty the log.
     ClearLog,
     /// Work something out beside the window, unless it is known.

@@ -8,8 +8,7 @@ use vasos_engine::experiment::ExperimentError;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::{Network, RigError, RigSpec};
 use vasos_engine::session::CommandError;
-use vasos_engine::signal::ChannelSet;
-use vasos_engine::sim::{Run, Scenario, check_starts};
+use vasos_engine::sim::{Scenario, check_starts};
 
 /// A preset that ships with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -256,48 +255,6 @@ pub fn load_scenario(path: &Path) -> Result<(Scenario, Arc<Network>), FileError>
         parse_rig(&file_name(&beside), &read_text(&beside)?)?
     };
     Ok((scenario, network))
-}
-
-/// Writes a run as CSV: `time_s`, then one column a channel, full precision, nothing for NaN.
-///
-/// # Errors
-/// [`FileError::Write`].
-pub fn write_run_csv(run: &Run, path: &Path) -> Result<(), FileError> {
-    let width = run.channels.len();
-    write_csv(&run.channels, &run.time_s, path, |row, column| run.values[row * width + column])
-}
-
-/// Writes columns as [`write_run_csv`] does; each has a value for every time.
-///
-/// # Errors
-/// [`FileError::Write`].
-pub fn write_columns_csv(
-    channels: &ChannelSet,
-    time_s: &[f64],
-    columns: &[&[f64]],
-    path: &Path,
-) -> Result<(), FileError> {
-    write_csv(channels, time_s, path, |row, column| columns[column][row])
-}
-
-fn write_csv(
-    channels: &ChannelSet,
-    time_s: &[f64],
-    path: &Path,
-    value: impl Fn(usize, usize) -> f64,
-) -> Result<(), FileError> {
-    let failed = |reason: String| FileError::Write { path: path.display().to_string(), reason };
-    let mut writer = csv::Writer::from_path(path).map_err(|e| failed(e.to_string()))?;
-    let names = channels.channels.iter().map(|c| c.name.as_str());
-    writer.write_record(std::iter::once("time_s").chain(names)).map_err(|e| failed(e.to_string()))?;
-    let cell = |v: f64| if v.is_nan() { String::new() } else { format!("{v}") };
-    for (row, time_s) in time_s.iter().enumerate() {
-        // Sample times are multiples of the sample time; nine decimals hide the rounding of the product.
-        let time = format!("{}", (time_s * 1e9).round() / 1e9);
-        let cells = std::iter::once(time).chain((0..channels.len()).map(|column| cell(value(row, column))));
-        writer.write_record(cells).map_err(|e| failed(e.to_string()))?;
-    }
-    writer.flush().map_err(|e| failed(e.to_string()))
 }
 
 pub(crate) fn parse<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> Result<T, FileError> {

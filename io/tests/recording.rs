@@ -18,7 +18,7 @@ use vasos_io::recording::{
 };
 use vasos_io::rig::preset;
 
-const FILE_ONLY: RecordingOptions = RecordingOptions { serve: false, port: None };
+const FILE_ONLY: RecordingOptions = RecordingOptions { serve: false, port: None, part_bytes: None };
 
 fn rig(id: &str) -> Rig {
     Rig { network: preset(id).expect("preset"), configuration: 0, measurement: Measurement::DEFAULT, seed: 1 }
@@ -186,7 +186,7 @@ fn a_port_in_use_is_a_trouble_and_another_is_found_when_free_to_choose() {
     let folder = folder();
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("bound").port();
-    let options = RecordingOptions { serve: true, port: Some(port) };
+    let options = RecordingOptions { port: Some(port), ..RecordingOptions::default() };
     let (mut recording, sink) = Recording::start(&folder.path().join("a.rrd"), options).expect("records");
     assert_eq!(recording.address(), None);
     assert!(matches!(recording.troubles()[..], [RecordingTrouble::NoServer { .. }]));
@@ -269,7 +269,7 @@ fn a_viewer_that_joins_and_is_killed_costs_no_row() {
     let folder = folder();
     let path = folder.path().join("run.rrd");
     let session = session("stad", 200.0);
-    let options = RecordingOptions { serve: true, port: None };
+    let options = RecordingOptions::default();
     let mut recording = record(&session, &path, options);
     let address = recording.address().expect("served").to_owned();
     let mut joined = viewer.join(&address);
@@ -305,7 +305,7 @@ fn a_recording_opens_as_a_log() {
     let log = open_log(&path, &ImportOptions::default()).expect("a log");
     assert_eq!(log.report.format, FileFormat::Recording);
     assert_eq!(log.table.len(), recorded.time_s.len(), "{:?}", log.report.repairs);
-    let pv = log.table.column("loop_1.pv").expect("a PV");
+    let pv = log.table.column("pv").expect("a PV");
     assert_eq!(pv.unit.as_deref(), Some("cm"));
     for (row, values) in recorded.values.iter().enumerate() {
         assert!(pv.values[row] == values[1] || (pv.values[row].is_nan() && values[1].is_nan()));
@@ -313,6 +313,6 @@ fn a_recording_opens_as_a_log() {
         assert!((log.table.time_s[row] - time_s).abs() < 1e-9);
     }
     let roles = &log.report.roles;
-    assert_eq!(roles.mv.as_deref(), Some("loop_1.mv"));
-    assert_eq!(roles.sp.as_deref(), Some("loop_1.sp"));
+    assert_eq!(roles.mv.as_deref(), Some("mv"));
+    assert_eq!(roles.sp.as_deref(), Some("sp"));
 }

@@ -8,7 +8,8 @@ use vasos_engine::experiment::{ExperimentEnd, run_experiment};
 use vasos_engine::session::RigCommand;
 use vasos_engine::sim::{Scenario, run_scenario};
 use vasos_io::experiment::parse_experiment;
-use vasos_io::rig::{load_scenario, parse_rig, write_run_csv};
+use vasos_io::export::write_run;
+use vasos_io::rig::{load_scenario, parse_rig};
 
 fn assets() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets")
@@ -61,7 +62,7 @@ fn every_scenario_that_ships_runs_and_is_the_same_each_time() {
         for name in ["a.csv", "b.csv"] {
             let run = run_scenario(network.clone(), &scenario).unwrap_or_else(|error| panic!("{error}"));
             let file = folder.path().join(name);
-            write_run_csv(&run, &file).expect("written");
+            write_run(&run, &file).expect("written");
             texts.push(std::fs::read(file).expect("read"));
         }
         assert!(texts[0] == texts[1] && texts[0].len() > 10_000, "{}", path.display());

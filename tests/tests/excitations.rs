@@ -14,7 +14,8 @@ use vasos_engine::model::ProcessModel;
 use vasos_engine::plant::{Fault, Measurement, Network, Plant, Reading, ReadingStatus, RigError};
 use vasos_engine::session::{CommandError, EventKind, Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::sim::{ClosedLoop, run_excitation};
-use vasos_io::rig::{load_scenario, preset, write_run_csv};
+use vasos_io::export::write_run;
+use vasos_io::rig::{load_scenario, preset};
 use vasos_tests::{
     CASCADE, TAG, begin, checked_step, excite, relay_test, tag, tested_rig, three_tanks, to_its_end,
 };
@@ -269,7 +270,7 @@ fn a_scenario_file_runs_a_test_and_its_csv_shows_it() {
     assert_eq!(run.excitations.len(), 1);
     assert_eq!(run.excitations[0].ending, Ending::Finished);
     let csv = folder.path().join("run.csv");
-    write_run_csv(&run, &csv).expect("written");
+    write_run(&run, &csv).expect("written");
     let written = std::fs::read_to_string(csv).expect("there");
     assert_eq!(written.lines().count(), run.time_s.len() + 1);
     for (wrong, at) in [("amplitude = 0.8", "amplitudes = 0.8"), ("not_needed", "never")] {

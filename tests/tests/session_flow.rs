@@ -15,9 +15,9 @@ use vasos_engine::excitation::{AtRest, Excitation, Relay, Signal, StepEnd, Ultim
 use vasos_engine::plant::spec::ValveLaw;
 use vasos_engine::plant::{Measurement, Network, RigSpec};
 use vasos_engine::session::{
-    Alarm, CommandError, Event, EventKind, Rig, RigCommand, Session, SessionCommand, Sink,
+    Alarm, CommandError, Event, EventKind, Rig, RigCommand, RunStart, Session, SessionCommand, Sink,
 };
-use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
+use vasos_engine::signal::{ChannelKind, SampleBlock};
 use vasos_engine::sim::{ClosedLoop, Scenario, ScenarioError, check_starts, run_scenario};
 use vasos_io::rig::{PRESETS, preset};
 
@@ -147,7 +147,7 @@ fn manual_and_back_and_coupled_to_decoupled_bring_no_bump() {
 struct Scripted<F: FnMut() + Send>(F);
 
 impl<F: FnMut() + Send> Sink for Scripted<F> {
-    fn started(&mut self, _: u64, _: &Arc<Network>, _: &Arc<ChannelSet>) {}
+    fn started(&mut self, _: &RunStart) {}
     fn samples(&mut self, _: &SampleBlock) {}
     fn event(&mut self, _: &Event) {
         (self.0)();
@@ -356,7 +356,7 @@ struct Seen {
 struct Counting(Arc<Seen>);
 
 impl Sink for Counting {
-    fn started(&mut self, _: u64, _: &Arc<Network>, _: &Arc<ChannelSet>) {
+    fn started(&mut self, _: &RunStart) {
         self.0.starts.fetch_add(1, Ordering::Relaxed);
     }
 

@@ -12,7 +12,8 @@ use vasos_engine::identify::FitError;
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::Rig;
 use vasos_engine::sim::run_excitation;
-use vasos_io::rig::{load_rig, write_run_csv};
+use vasos_io::export::write_run;
+use vasos_io::rig::load_rig;
 
 use super::json::{self, shown, table};
 use super::{Answer, Refusal, point};
@@ -161,7 +162,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let (run, report) =
         run_excitation(&rig, &arguments.tag, arguments.level, &excitation).map_err(Refusal::of)?;
     if let Some(path) = &arguments.output {
-        write_run_csv(&run, path).map_err(Refusal::of)?;
+        write_run(&run, path).map_err(Refusal::of)?;
     }
     let told = report.moved_at_s.map(|_| identify_report(&report));
     let status = u8::from(report.ending != Ending::Finished);

@@ -7,11 +7,12 @@ use serde_json::{Map, Value, json};
 use vasos_engine::analyze::{Excitation, Metrics};
 use vasos_engine::excitation::{Ending, ExcitationReport};
 use vasos_engine::plant::Network;
-use vasos_engine::session::{Event, EventKind};
+use vasos_engine::session::{Event, EventKind, RunStart};
 use vasos_engine::signal::SampleBlock;
-use vasos_engine::sim::{LoopFigures, Run, Scenario, run_scenario};
+use vasos_engine::sim::{LoopFigures, Run, Scenario, run_scenario, scenario_loop};
 use vasos_io::recording::{Recording, RecordingOptions};
-use vasos_io::rig::{load_scenario, write_run_csv};
+use vasos_io::export::write_run;
+use vasos_io::rig::load_scenario;
 
 use super::json::{self, shown, table};
 use super::{Answer, Refusal, ensemble, excite};
@@ -32,7 +33,7 @@ loop's output, of the whole run as after a load. They are taken from the rows th
 pub struct Arguments {
     /// Scenario file (TOML).
     scenario: PathBuf,
-    /// File to write: .csv or .rrd; .parquet is not available yet. An existing file is replaced.
+    /// File to write: .csv, .parquet or .rrd. An existing file is replaced.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Add IE, IAE, ISE, ITAE, overshoot, decay ratio, rise and settling time, steady error, total variation of
@@ -59,7 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let run = run_scenario(network.clone(), &scenario).map_err(Refusal::of)?;
     if let (Some(path), Some(kind)) = (&arguments.output, kind) {
         match kind {
-            Kind::Csv => write_run_csv(&run, path).map_err(Refusal::of)?,
+            Kind::Table => write_run(&run, path).map_err(Refusal::of)?,
             Kind::Recording => write_recording(&run, &scenario, &network, path)?,
         }
     }
@@ -172,16 +173,15 @@ fn figures_table(run: &Run) -> String {
 
 #[derive(Clone, Copy)]
 enum Kind {
-    Csv,
+    Table,
     Recording,
 }
 
 fn extension(path: &Path) -> Result<Kind, Refusal> {
     match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
-        Some("csv") => Ok(Kind::Csv),
+        Some("csv" | "parquet") => Ok(Kind::Table),
         Some("rrd") => Ok(Kind::Recording),
-        Some("parquet") => Err(Refusal::later("writing .parquet")),
-        _ => Err(Refusal(format!("{}: the name must end in .csv or .rrd", path.display()))),
+        _ => Err(Refusal(format!("{}: the name must end in .csv, .parquet or .rrd", path.display()))),
     }
 }
 
@@ -191,9 +191,9 @@ fn write_recording(
     network: &Arc<Network>,
     path: &Path,
 ) -> Result<(), Refusal> {
-    let options = RecordingOptions { serve: false, port: None };
+    let options = RecordingOptions { serve: false, ..RecordingOptions::default() };
     let (recording, mut sink) = Recording::start(path, options).map_err(Refusal::of)?;
-    sink.started(0, network, &run.channels);
+    sink.started(&RunStart::of(&scenario_loop(network, scenario).map_err(Refusal::of)?, 0));
     for event in &scenario.events {
         sink.event(&Event { run: 0, time_s: event.at_s, kind: EventKind::Done(event.command.clone()) });
     }

@@ -7,7 +7,7 @@ use vasos_engine::document::{DocumentCommand, SourceChoice, Stretch};
 use vasos_engine::signal::{ChannelKind, Pyramid};
 use vasos_engine::sim::LoopTarget;
 
-use crate::action::Action;
+use crate::action::{Action, Table};
 use crate::panes::View;
 use crate::theme::{self, Palette};
 use crate::traces::RunTrace;
@@ -57,7 +57,9 @@ struct Content<'a> {
     lower: Vec<Curve<'a>>,
     upper_axis: String,
     lower_axis: String,
+    /// What is followed: the newest sample, or the time that is played.
     end_s: f64,
+    end_of_all_s: f64,
 }
 
 /// Draws the pane.
@@ -74,8 +76,9 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     header(ui, view, state, is_log, &mut actions);
     let content = if is_log { of_log(view, &p) } else { of_run(view, state, &p) };
     if state.follow {
-        let span = SPANS_S[state.span].unwrap_or_else(|| content.end_s.max(60.0));
-        let end = content.end_s.max(span);
+        let all = content.end_of_all_s.max(60.0);
+        let span = SPANS_S[state.span].unwrap_or(all);
+        let end = if SPANS_S[state.span].is_some() { content.end_s.max(span) } else { all };
         state.bounds_s = [end - span, end + 0.05 * span];
     }
     legend(ui, &content);
@@ -122,7 +125,7 @@ fn header(ui: &mut egui::Ui, view: &View, state: &mut State, is_log: bool, actio
                 actions.push(Action::KeepRun);
             }
             if ui.button(tr!("trend.export")).on_hover_text(tr!("trend.export_hint")).clicked() {
-                actions.push(Action::ExportTrend);
+                actions.push(Action::ExportTrend(Table::Csv));
             }
         }
     });
@@ -134,7 +137,8 @@ fn of_run<'a>(view: &View<'a>, state: &State, p: &Palette) -> Content<'a> {
         lower: vec![],
         upper_axis: tr!("trend.level_axis"),
         lower_axis: "MV".to_owned(),
-        end_s: view.run.end_s(),
+        end_s: view.snapshot.span_s.map_or_else(|| view.run.end_s(), |_| view.snapshot.time_s),
+        end_of_all_s: view.run.end_s(),
     };
     let spec = &view.snapshot.network.spec;
     if state.tanks {
@@ -236,7 +240,7 @@ fn of_log<'a>(view: &View<'a>, p: &Palette) -> Content<'a> {
         axes = [axis("PV", roles.pv), axis("MV", roles.mv)];
     }
     let [upper_axis, lower_axis] = axes;
-    Content { upper, lower, upper_axis, lower_axis, end_s }
+    Content { upper, lower, upper_axis, lower_axis, end_s, end_of_all_s: end_s }
 }
 
 #[allow(clippy::too_many_arguments, reason = "the two halves of one pane share all of its parts")]
@@ -289,6 +293,7 @@ fn plot(
     let stretch = view.document.stretch;
     let marks = &view.run.marks;
     let log = view.document.source == SourceChoice::Log;
+    let played_s = view.snapshot.span_s.filter(|_| !log).map(|_| view.snapshot.time_s);
     let response = plot.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(bounds[0]..=bounds[1]);
         let range = draw_curves(plot_ui, curves, bounds, pixels);
@@ -302,6 +307,9 @@ fn plot(
         }
         if !log {
             draw_marks(plot_ui, marks, bounds, is_upper, p);
+        }
+        if let Some(at_s) = played_s {
+            plot_ui.vline(VLine::new("", at_s).color(p.accent_text).width(1.5));
         }
         let zoomed = plot_ui.response().hovered().then(|| plot_ui.ctx().input(|i| i.smooth_scroll_delta.y));
         let pointer = plot_ui.pointer_coordinate();

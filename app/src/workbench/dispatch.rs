@@ -10,7 +10,7 @@ use vasos_io::recording::{Recording, RecordingOptions};
 
 use super::jobs::Outcome;
 use super::{Workbench, files, tiles};
-use crate::action::Action;
+use crate::action::{Action, Table};
 use crate::answers::Question;
 use crate::journal::{self, Weight};
 use crate::panes::identify;
@@ -31,6 +31,10 @@ impl Workbench {
             }
             Action::Step => self.session_command(SessionCommand::Step),
             Action::Speed(speed) => self.session_command(SessionCommand::Speed(speed)),
+            Action::Restart if self.parked.is_some() => self.session_command(SessionCommand::Seek(f64::MIN)),
+            Action::Seek(time_s) => self.session_command(SessionCommand::Seek(time_s)),
+            Action::PlayRun(index) => self.play_run(ctx, index),
+            Action::OpenInRerun => self.open_in_rerun(),
             Action::Restart => {
                 let document = self.history.document().clone();
                 self.reload(&document);
@@ -45,6 +49,11 @@ impl Workbench {
             },
             Action::AskFile => self.jobs.ask_file(),
             Action::OpenFile(path) => self.open(path),
+            Action::OpenLogs(paths) => {
+                self.notice = None;
+                let options = vasos_io::log::ImportOptions::default();
+                self.jobs.start("import", move || files::read_log(&paths, &options));
+            }
             Action::ToggleRecording => self.toggle_recording(),
             Action::RecordAlways(on) => {
                 self.settings.record_always = on;
@@ -89,7 +98,7 @@ impl Workbench {
                 self.tree = tiles::first_layout();
                 self.maximised = None;
             }
-            Action::ExportTrend => self.export_trend(),
+            Action::ExportTrend(table) => self.export_trend(table),
             Action::ClearLog => self.journal.clear(),
             Action::Ask(question) => self.work_out(question),
             Action::Copy(words) => ctx.copy_text(words),
@@ -139,10 +148,11 @@ impl Workbench {
             Consequence::Reload => self.reload(&after),
             Consequence::Commands(commands) => {
                 for command in commands {
-                    self.session_command(SessionCommand::Rig(command));
+                    self.rig_command(SessionCommand::Rig(command));
                 }
             }
         }
+        self.follow_source(&after);
         let shown = self.log.as_ref().map(|l| Arc::as_ptr(&l.table));
         if shown != after.log.as_ref().map(Arc::as_ptr) {
             self.log = after.log.clone().map(LogTrace::new);
@@ -152,9 +162,9 @@ impl Workbench {
     fn reload(&mut self, document: &Document) {
         let rig = &document.rig;
         let load = rig.to_start();
-        self.session_command(SessionCommand::Load(Box::new(load)));
+        self.rig_command(SessionCommand::Load(Box::new(load)));
         for command in rig.commands_after_load() {
-            self.session_command(SessionCommand::Rig(command));
+            self.rig_command(SessionCommand::Rig(command));
         }
     }
 
@@ -175,14 +185,14 @@ impl Workbench {
         }
     }
 
-    fn toggle_recording(&mut self) {
+    pub(super) fn toggle_recording(&mut self) {
         if let Some(recording) = self.recording.take() {
             self.session_command(SessionCommand::Detach { id: recording.id() });
             // Closing waits for the recorder and tidies the file up: seconds, on a slow disk.
             self.jobs.start("close", move || {
-                let (path, rows) = (recording.path().to_owned(), recording.rows());
+                let (files, rows) = (recording.parts(), recording.rows());
                 match recording.close() {
-                    Ok(()) => Outcome::Recorded(path, rows),
+                    Ok(()) => Outcome::Recorded(files, rows),
                     Err(trouble) => Outcome::Failed(Box::new(trouble)),
                 }
             });
@@ -195,17 +205,19 @@ impl Workbench {
                 let viewer = recording.address().unwrap_or("–").to_owned();
                 self.tell(Weight::Note, tr!("event.recording", path = path.display(), viewer = viewer));
                 self.recording = Some(recording);
+                self.noted = super::replay::Noted::default();
             }
             Err(error) => self.refuse(i18n::say(&error)),
         }
     }
 
-    fn export_trend(&mut self) {
-        let path = vasos_io::settings::recordings_dir().join(format!("vasos-{}.csv", text::stamp()));
+    fn export_trend(&mut self, table: Table) {
+        let name = format!("vasos-{}.{}", text::stamp(), table.ending());
+        let path = vasos_io::settings::recordings_dir().join(name);
         let Some(channels) = self.run.channels.clone() else { return };
         let columns: Vec<&[f64]> = self.run.columns.iter().map(|c| c.values()).collect();
         let time_s = self.run.columns.first().map_or(&[][..], |c| c.time_s());
-        match vasos_io::rig::write_columns_csv(&channels, time_s, &columns, &path) {
+        match vasos_io::export::write_columns(&channels, time_s, &columns, &path) {
             Ok(()) => {
                 self.tell(Weight::Note, tr!("event.exported", rows = time_s.len(), path = path.display()))
             }

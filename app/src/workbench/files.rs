@@ -7,7 +7,8 @@ use eframe::egui;
 use vasos_engine::document::{DocumentCommand, LogRoles};
 use vasos_engine::experiment::ExperimentEnd;
 use vasos_io::experiment::load_experiment;
-use vasos_io::log::{DateOrder, ImportError, ImportOptions, ImportedLog, Repair, open_log};
+use vasos_io::log::{DateOrder, ImportError, ImportOptions, ImportedLog, Repair, open_log, open_logs};
+use vasos_io::recording::{Parts, RecordingError, read_runs};
 use vasos_io::rig::{FileError, load_rig};
 
 use super::Workbench;
@@ -22,7 +23,7 @@ const PREVIEW_ROWS: usize = 6;
 
 /// A log that was read and waits for its columns to be confirmed.
 pub struct ImportSheet {
-    path: PathBuf,
+    paths: Vec<PathBuf>,
     log: ImportedLog,
     roles: LogRoles,
     sample_time_s: f64,
@@ -32,7 +33,7 @@ pub struct ImportSheet {
 
 impl ImportSheet {
     /// A sheet with the columns the importer proposes.
-    pub fn new(path: PathBuf, log: ImportedLog, options: ImportOptions) -> Self {
+    pub fn new(paths: Vec<PathBuf>, log: ImportedLog, options: ImportOptions) -> Self {
         let proposed = &log.report.roles;
         let index = |name: &Option<String>| name.as_deref().and_then(|n| log.table.index_of(n));
         let roles = LogRoles {
@@ -43,12 +44,21 @@ impl ImportSheet {
             disturbance: None,
         };
         let sample_time_s = options.sample_time_s.unwrap_or(1.0);
-        Self { path, log, roles, sample_time_s, options }
+        Self { paths, log, roles, sample_time_s, options }
     }
 }
 
 /// Reads a file in a job: a rig or an experiment when it ends in `.toml`, else a log.
 pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("rrd")) {
+        let parts = Parts::of(path);
+        match read_runs(&parts) {
+            Ok(runs) => return Outcome::Runs(parts.0, runs.into_iter().map(Arc::new).collect()),
+            // A recording of something else has numbers all the same.
+            Err(RecordingError::NoRig { .. }) => {}
+            Err(error) => return Outcome::Failed(Box::new(error)),
+        }
+    }
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         // Only an experiment expects something.
         let text = std::fs::read_to_string(path).unwrap_or_default();
@@ -68,12 +78,22 @@ pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
         let reason = tr!("window.is_folder");
         return Outcome::Failed(Box::new(FileError::Read { path: shown, reason }));
     }
-    match open_log(path, options) {
-        Ok(log) => Outcome::Log(path.to_owned(), Box::new(log), options.clone()),
-        Err(ImportError::Read { reason }) => {
-            Outcome::Failed(Box::new(FileError::Read { path: shown, reason }))
+    read_log(&[path.to_owned()], options)
+}
+
+/// Reads a log out of one file or several in a job.
+pub fn read_log(paths: &[PathBuf], options: &ImportOptions) -> Outcome {
+    let shown = |path: &Path| path.display().to_string();
+    let opened = match paths {
+        [path] => open_log(path, options).map_err(|error| (shown(path), error)),
+        paths => open_logs(paths, options),
+    };
+    match opened {
+        Ok(log) => Outcome::Log(paths.to_vec(), Box::new(log), options.clone()),
+        Err((path, ImportError::Read { reason })) => {
+            Outcome::Failed(Box::new(FileError::Read { path, reason }))
         }
-        Err(error) => Outcome::Failed(Box::new(error)),
+        Err((_, error)) => Outcome::Failed(Box::new(error)),
     }
 }
 
@@ -98,11 +118,17 @@ impl Workbench {
 
     /// Opens what was dropped on the window in this frame. A frame drawn twice brings the same drop twice.
     pub(super) fn take_dropped(&mut self, ui: &egui::Ui, actions: &mut Vec<Action>) {
-        let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().cloned()) else { return };
+        let files = ui.input(|i| i.raw.dropped_files.clone());
+        let Some(dropped) = files.first().cloned() else { return };
         if self.dropped.as_ref().is_some_and(|known| std::sync::Arc::ptr_eq(known, &dropped)) {
             return;
         }
-        actions.push(Action::OpenFile(dropped.path().to_owned()));
+        let paths: Vec<PathBuf> = files.iter().map(|file| file.path().to_owned()).collect();
+        actions.push(if paths.len() > 1 {
+            Action::OpenLogs(paths)
+        } else {
+            Action::OpenFile(dropped.path().to_owned())
+        });
         self.dropped = Some(dropped);
     }
 
@@ -110,10 +136,11 @@ impl Workbench {
     pub(super) fn take_results(&mut self, ctx: &egui::Context) {
         for outcome in self.jobs.results().into_iter().chain(self.beside.results()) {
             match outcome {
-                Outcome::Log(path, log, options) => {
+                Outcome::Runs(files, runs) => self.take_runs(ctx, files, runs),
+                Outcome::Log(paths, log, options) => {
                     let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
                     self.tell(Weight::Note, words);
-                    self.import = Some(ImportSheet::new(path, *log, options));
+                    self.import = Some(ImportSheet::new(paths, *log, options));
                 }
                 Outcome::Rig(path, network) => {
                     self.settings.remember(path);
@@ -126,8 +153,10 @@ impl Workbench {
                 Outcome::Ran(finished) => self.take_experiment(*finished),
                 Outcome::Model(model) => self.act(ctx, Action::Document(DocumentCommand::AddModel(model))),
                 Outcome::Chosen(path) => self.act(ctx, Action::OpenFile(path)),
-                Outcome::Recorded(path, rows) => {
-                    self.tell(Weight::Note, tr!("event.recorded", rows = rows, path = path.display()));
+                Outcome::Recorded(files, rows) => {
+                    let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+                    self.tell(Weight::Note, tr!("event.recorded", rows = rows, path = names.join(", ")));
+                    self.recorded = files;
                 }
                 Outcome::Answered(question, reply) => self.answers.take(*question, *reply),
                 Outcome::Cancelled => {}
@@ -175,7 +204,7 @@ impl Workbench {
                 for repair in &sheet.log.report.repairs {
                     self.tell(Weight::Caution, i18n::say(repair));
                 }
-                self.settings.remember(sheet.path.clone());
+                sheet.paths.iter().for_each(|path| self.settings.remember(path.clone()));
                 let table = std::sync::Arc::new(sheet.log.table);
                 actions.push(Action::Document(DocumentCommand::OpenLog(table, sheet.roles)));
             }
@@ -183,8 +212,8 @@ impl Workbench {
                 self.tell(Weight::Note, tr!("import_sheet.cancelled", name = sheet.log.table.name))
             }
             Answer::ReadAgain => {
-                let (path, options) = (sheet.path.clone(), sheet.options.clone());
-                self.jobs.start("import", move || read(&path, &options));
+                let (paths, options) = (sheet.paths.clone(), sheet.options.clone());
+                self.jobs.start("import", move || read_log(&paths, &options));
             }
         }
     }

@@ -10,6 +10,7 @@ use vasos_engine::document::NewModel;
 use vasos_engine::experiment::Experiment;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::Network;
+use vasos_engine::session::RecordedRun;
 use vasos_io::log::{ImportOptions, ImportedLog};
 
 use crate::answers::{Question, Reply};
@@ -24,7 +25,9 @@ pub type Said = Box<dyn Explain + Send>;
 /// What a job came to.
 pub enum Outcome {
     /// A log was read.
-    Log(PathBuf, Box<ImportedLog>, ImportOptions),
+    Log(Vec<PathBuf>, Box<ImportedLog>, ImportOptions),
+    /// The runs of a recording were read, with the files they are in.
+    Runs(Vec<PathBuf>, Vec<Arc<RecordedRun>>),
     /// A rig was read.
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.
@@ -35,8 +38,8 @@ pub enum Outcome {
     Ran(Box<Finished>),
     /// A pane's question was worked out.
     Answered(Box<Question>, Box<Reply>),
-    /// A recording is complete, with so many rows.
-    Recorded(PathBuf, u64),
+    /// A recording is complete: its files, its rows.
+    Recorded(Vec<PathBuf>, u64),
     /// A file was chosen.
     Chosen(PathBuf),
     /// The dialog was closed without a choice.

@@ -3,6 +3,7 @@
 mod dispatch;
 mod files;
 mod jobs;
+mod replay;
 mod settings;
 mod tiles;
 mod topbar;
@@ -14,7 +15,7 @@ use std::sync::Arc;
 use eframe::egui;
 use vasos_engine::document::{Document, DocumentCommand, History, SourceChoice};
 use vasos_engine::excitation::{Ending, ExcitationReport, Signal, StepEnd};
-use vasos_engine::session::{EventKind, Session, SessionCommand};
+use vasos_engine::session::{EventKind, RecordedRun, Session, SessionCommand};
 use vasos_engine::signal::SampleBlock;
 use vasos_io::rig::PRESETS;
 
@@ -32,6 +33,7 @@ use self::files::ImportSheet;
 pub use self::files::column_choice;
 use self::jobs::Jobs;
 pub use self::jobs::Outcome;
+use self::replay::{Noted, Parked};
 
 /// How a workbench starts.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +48,7 @@ pub struct Options {
 
 /// The window's state.
 pub struct Workbench {
+    ctx: egui::Context,
     session: Session,
     history: History,
     run: RunTrace,
@@ -64,6 +67,16 @@ pub struct Workbench {
     desk: Desk,
     import: Option<ImportSheet>,
     recording: Option<vasos_io::recording::Recording>,
+    /// Files of the recording that was opened or ended last.
+    recorded: Vec<PathBuf>,
+    /// Runs of the recording that was opened.
+    runs: Vec<Arc<RecordedRun>>,
+    /// A choice among them is open.
+    choosing_run: bool,
+    /// The simulated rig, while a recording is played.
+    parked: Option<Parked>,
+    /// Model and tuning that the recording has been told of.
+    noted: Noted,
     path_field: Option<String>,
     notice: Option<String>,
     dropped: Option<egui::DroppedFileHandle>,
@@ -90,6 +103,7 @@ impl Workbench {
         let session = Session::start(&rig, Box::new(move || repaint.request_repaint()))?;
         let tree = settings.layout.clone().unwrap_or_else(tiles::first_layout);
         let mut workbench = Self {
+            ctx: ctx.clone(),
             session,
             history: History::new(document),
             run: RunTrace::default(),
@@ -106,6 +120,11 @@ impl Workbench {
             desk: Desk::default(),
             import: None,
             recording: None,
+            recorded: vec![],
+            runs: vec![],
+            choosing_run: false,
+            parked: None,
+            noted: Noted::default(),
             path_field: None,
             notice: None,
             dropped: None,
@@ -208,6 +227,7 @@ impl Workbench {
                 journal::add(&mut self.journal, journal::entry(Weight::Alarm, words));
             }
         }
+        self.note_recording();
         self.set_title(ctx);
     }
 
@@ -240,6 +260,7 @@ impl Workbench {
         self.take_dropped(ui, &mut actions);
         actions.extend(self.top_bar(ui, &snapshot, &document));
         actions.extend(self.status_bar(ui, &snapshot, &document));
+        self.scrub_bar(ui, &snapshot, &document, &mut actions);
         let view = View {
             snapshot: &snapshot,
             document: &document,
@@ -259,6 +280,7 @@ impl Workbench {
                 actions.extend(tiles::ui(ui, &mut self.tree, self.maximised, &view, &mut self.states));
             });
         self.import_ui(ui, &mut actions);
+        self.runs_ui(ui, &mut actions);
         self.notice_ui(ui);
         self.path_ui(ui, &mut actions);
         let ctx = ui.ctx().clone();
@@ -304,6 +326,9 @@ impl Workbench {
         let document = self.history.document();
         let shown = match (document.source, &document.log) {
             (SourceChoice::Log, Some(log)) => log.name.clone(),
+            (SourceChoice::Replay, _) => {
+                document.recording.as_ref().map_or_else(String::new, |run| run.name.clone())
+            }
             _ => document.rig.network.spec.title.get(i18n::current().tag()).to_owned(),
         };
         let title = format!("Vasos · {shown}");

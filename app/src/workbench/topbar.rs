@@ -10,7 +10,7 @@ use vasos_io::rig::PRESETS;
 
 use super::Workbench;
 use super::settings::ZOOM;
-use crate::action::Action;
+use crate::action::{Action, Table};
 use crate::i18n::{self, Language};
 use crate::widgets::{Icon, icon_button, segmented};
 use crate::{journal, text, theme, tr};
@@ -28,12 +28,15 @@ impl Workbench {
                 ui.label(RichText::new("Vasos").family(theme::bold()).size(17.0));
                 self.menus(ui, document, &mut actions);
                 ui.separator();
-                if document.log.is_some() {
-                    let sources = [tr!("top.simulated"), tr!("top.log")];
-                    let chosen = usize::from(document.source == SourceChoice::Log);
-                    if let Some(chosen) = segmented(ui, &tr!("top.source"), &sources, chosen) {
-                        let source = if chosen == 1 { SourceChoice::Log } else { SourceChoice::Simulated };
-                        actions.push(Action::Document(DocumentCommand::Source(source)));
+                let mut sources = vec![(SourceChoice::Simulated, tr!("top.simulated"))];
+                sources.extend(document.log.as_ref().map(|_| (SourceChoice::Log, tr!("top.log"))));
+                let replay = || (SourceChoice::Replay, tr!("top.replay"));
+                sources.extend(document.recording.as_ref().map(|_| replay()));
+                if sources.len() > 1 {
+                    let names: Vec<String> = sources.iter().map(|(_, name)| name.clone()).collect();
+                    let chosen = sources.iter().position(|(s, _)| *s == document.source).unwrap_or(0);
+                    if let Some(chosen) = segmented(ui, &tr!("top.source"), &names, chosen) {
+                        actions.push(Action::Document(DocumentCommand::Source(sources[chosen].0)));
                     }
                 }
                 let language = i18n::current().tag();
@@ -86,8 +89,17 @@ impl Workbench {
                 if ui.checkbox(&mut always, tr!("menu.record_always")).changed() {
                     actions.push(Action::RecordAlways(always));
                 }
-                if ui.button(tr!("trend.export")).clicked() {
-                    actions.push(Action::ExportTrend);
+                let shown = self.recording.is_some() || !self.recorded.is_empty();
+                let button = egui::Button::new(tr!("menu.rerun"));
+                let hint = if shown { tr!("menu.rerun_hint") } else { tr!("menu.rerun_none") };
+                if ui.add_enabled(shown, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked() {
+                    actions.push(Action::OpenInRerun);
+                }
+                ui.separator();
+                for (name, table) in [("trend.export", Table::Csv), ("menu.export_parquet", Table::Parquet)] {
+                    if ui.button(tr!(name)).clicked() {
+                        actions.push(Action::ExportTrend(table));
+                    }
                 }
             });
             ui.menu_button(tr!("menu.edit"), |ui| {

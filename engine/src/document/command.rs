@@ -11,7 +11,7 @@ use crate::explain::{Explain, number};
 use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network, RigError};
-use crate::session::CommandError;
+use crate::session::{CommandError, RecordedRun};
 use crate::signal::LogTable;
 use crate::tune::optimum::OptimumError;
 
@@ -44,6 +44,8 @@ pub enum DocumentCommand {
     Seed(u64),
     /// A log was imported, with the columns proposed.
     OpenLog(Arc<LogTable>, LogRoles),
+    /// A recording was opened: its rig as it was set, its models, and the recording as source.
+    OpenRecording(Arc<RecordedRun>),
     /// Columns of the log.
     Roles(LogRoles),
     /// Data in use.
@@ -158,6 +160,7 @@ impl DocumentCommand {
             Self::Measurement(_) => "measurement",
             Self::Seed(_) => "seed",
             Self::OpenLog(..) => "open_log",
+            Self::OpenRecording(_) => "open_recording",
             Self::Roles(_) => "roles",
             Self::Source(_) => "source",
             Self::Stretch(_) => "stretch",
@@ -168,6 +171,24 @@ impl DocumentCommand {
             Self::TauC(..) => "tau_c",
             Self::Optimum(_) => "optimum",
         }
+    }
+
+    /// Whether it changes how the rig or one of its loops is set.
+    fn changes_rig(&self) -> bool {
+        matches!(
+            self,
+            Self::Configuration(_)
+                | Self::Setpoint(..)
+                | Self::Mode(..)
+                | Self::Tuning(..)
+                | Self::ApplyTuning(..)
+                | Self::PvFilter(..)
+                | Self::Law(..)
+                | Self::Options(..)
+                | Self::Angle(..)
+                | Self::Measurement(_)
+                | Self::Seed(_)
+        )
     }
 
     /// Changes that follow each other with the same thread become one step of the history.
@@ -194,8 +215,16 @@ impl Document {
     /// [`DocumentError`]; the document is as before.
     pub fn after(&self, command: &DocumentCommand) -> Result<Self, DocumentError> {
         let mut next = self.clone();
+        if self.source == SourceChoice::Replay && command.changes_rig() {
+            return Err(CommandError::Replay.into());
+        }
         match command {
-            DocumentCommand::OpenRig(network) => next.rig = RigSettings::new(network.clone()),
+            DocumentCommand::OpenRig(network) => {
+                next.rig = RigSettings::new(network.clone());
+                if next.source == SourceChoice::Replay {
+                    next.source = SourceChoice::Simulated;
+                }
+            }
             DocumentCommand::Configuration(index) => {
                 if *index >= self.rig.network.spec.configurations.len() {
                     return Err(CommandError::UnknownTag { tag: index.to_string() }.into());
@@ -218,6 +247,7 @@ impl Document {
                 next.source = SourceChoice::Log;
                 next.stretch = None;
             }
+            DocumentCommand::OpenRecording(run) => next.open_recording(run),
             DocumentCommand::Roles(roles) => {
                 if roles.pv.is_some() && roles.pv == roles.mv {
                     return Err(DocumentError::SameColumn);
@@ -264,6 +294,24 @@ impl Document {
             }
         }
         Ok(next)
+    }
+
+    fn open_recording(&mut self, run: &Arc<RecordedRun>) {
+        self.rig = RigSettings::recorded(run);
+        self.recording = Some(run.clone());
+        self.source = SourceChoice::Replay;
+        self.stretch = None;
+        for recorded in &run.models {
+            self.add_model(&NewModel {
+                model: recorded.model.clone(),
+                origin: ModelOrigin::Recording { name: run.name.clone() },
+                fit: None,
+                study: None,
+                rows: None,
+                pv_unit: recorded.pv_unit.clone(),
+                mv_unit: recorded.mv_unit.clone(),
+            });
+        }
     }
 
     /// Carries out a command for one loop; others change nothing.

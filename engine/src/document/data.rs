@@ -7,7 +7,7 @@ use crate::control::{Law, LoopOptions, LoopSpec, Mode, PidGains, PidTuning, oute
 use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
-use crate::session::Rig;
+use crate::session::{RecordedRun, Rig};
 use crate::signal::LogTable;
 use crate::tune::optimum::{LoopLimits, Objective};
 
@@ -85,6 +85,18 @@ impl RigSettings {
         settings
     }
 
+    /// A rig as it was set when a recording of it began.
+    #[must_use]
+    pub fn recorded(run: &RecordedRun) -> Self {
+        let mut settings = Self::new(run.network.clone());
+        if run.configuration < run.network.spec.configurations.len() {
+            settings.configuration = run.configuration;
+            settings.turn_valves();
+        }
+        settings.measurement = run.measurement.unwrap_or(settings.measurement);
+        settings
+    }
+
     /// What a session starts on; everything else follows by commands.
     #[must_use]
     pub fn to_start(&self) -> Rig {
@@ -139,6 +151,8 @@ pub enum SourceChoice {
     Simulated,
     /// The imported log.
     Log,
+    /// The recording that is played.
+    Replay,
 }
 
 /// Which columns of a log are what; indices into its columns.
@@ -176,6 +190,11 @@ pub enum ModelOrigin {
         tag: String,
         /// The stretch.
         stretch: Stretch,
+    },
+    /// Taken out of a recording.
+    Recording {
+        /// Name of the run.
+        name: String,
     },
     /// Fitted to a stretch of a log.
     Log {
@@ -251,6 +270,8 @@ pub struct Document {
     pub log: Option<Arc<LogTable>>,
     /// Its columns' roles.
     pub roles: LogRoles,
+    /// The recording that is open.
+    pub recording: Option<Arc<RecordedRun>>,
     /// Data in use.
     pub source: SourceChoice,
     /// Stretch chosen for identification.
@@ -275,6 +296,7 @@ impl Document {
             rig: RigSettings::new(network),
             log: None,
             roles: LogRoles::default(),
+            recording: None,
             source: SourceChoice::Simulated,
             stretch: None,
             models: vec![],

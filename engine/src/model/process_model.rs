@@ -54,6 +54,31 @@ pub enum ProcessModel {
     Rational(TransferFunction),
 }
 
+/// As the command line writes models: `K=4.9,T=152,L=2`, times in seconds.
+impl std::fmt::Display for ProcessModel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::Fopdt(m) => {
+                write!(f, "K={},T={},L={}", n(m.gain), n(m.time_constant_s), n(m.dead_time_s))
+            }
+            Self::Ipdt(m) => write!(f, "Kv={},L={}", n(m.velocity_gain), n(m.dead_time_s)),
+            Self::Sopdt(m) => {
+                let [t1, t2] = [m.time_constant_1_s, m.time_constant_2_s].map(n);
+                write!(f, "K={},T1={t1},T2={t2},L={}", n(m.gain), n(m.dead_time_s))?;
+                if m.zero_time_constant_s != 0.0 {
+                    write!(f, ",Tz={}", n(m.zero_time_constant_s))?;
+                }
+                Ok(())
+            }
+            Self::Rational(m) => {
+                let falling = |c: &[f64]| c.iter().map(|c| n(*c)).collect::<Vec<_>>().join(" ");
+                write!(f, "num={},den={},L={}", falling(&m.num), falling(&m.den), n(m.dead_time_s))
+            }
+        }
+    }
+}
+
 /// Why a set of numbers is not a process model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {

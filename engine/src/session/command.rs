@@ -235,6 +235,12 @@ pub enum CommandError {
     /// A valve, tank or configuration of something that has none.
     #[error("this source has no valves or tanks that can be set from here")]
     NotARig,
+    /// A change asked of a recording.
+    #[error("a recording cannot be changed; switch the source to the simulated rig first")]
+    Replay,
+    /// Another time asked of a running rig.
+    #[error("a running rig has only its present; open a recording to go back in time")]
+    NoReplay,
     /// A speed that is not possible.
     #[error("a speed of {} × is not possible; choose 1 × to 1000 ×", number(*.speed))]
     Speed {
@@ -256,6 +262,8 @@ impl Explain for CommandError {
             Self::Cascade { .. } => "command.cascade",
             Self::Follows { .. } => "command.follows",
             Self::NotARig => "command.not_a_rig",
+            Self::Replay => "command.replay",
+            Self::NoReplay => "command.no_replay",
             Self::Speed { .. } => "command.speed",
         }
     }
@@ -273,7 +281,7 @@ impl Explain for CommandError {
                 vec![("tag", tag.clone()), ("level_cm", number(*level_cm)), ("rim_cm", number(*rim_cm))]
             }
             Self::Faulty { tag, kind } => vec![("tag", tag.clone()), ("kind", (*kind).to_owned())],
-            Self::NotARig => vec![],
+            Self::NotARig | Self::Replay | Self::NoReplay => vec![],
             Self::Speed { speed } => vec![("speed", number(*speed))],
         }
     }
@@ -292,6 +300,8 @@ impl CommandError {
             Self::Cascade { tag: tag() },
             Self::Follows { tag: tag(), inner: "LIC-03".to_owned() },
             Self::NotARig,
+            Self::Replay,
+            Self::NoReplay,
             Self::Speed { speed: -3.0 },
         ]
     }

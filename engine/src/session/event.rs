@@ -109,6 +109,11 @@ pub enum EventKind {
     },
     /// A test on a loop ended, with what came of it; the loop is as it was before.
     ExcitationEnded(Arc<ExcitationReport>),
+    /// What a recording says happened, in its own words: for kinds that it keeps as words only.
+    Recorded {
+        /// The words.
+        words: String,
+    },
     /// Samples nobody fetched were given up.
     SamplesLost {
         /// How many.

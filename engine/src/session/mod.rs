@@ -8,6 +8,8 @@ mod alarms;
 mod command;
 mod event;
 mod exact;
+mod recorded;
+mod replay;
 mod sink;
 mod snapshot;
 mod worker;
@@ -20,12 +22,14 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 pub use command::{CommandError, RigCommand};
 pub use event::{Alarm, Event, EventKind};
-pub use sink::Sink;
+pub use recorded::{RecordedModel, RecordedRun};
+pub use sink::{RunStart, Sink};
 pub use snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 
 use crate::plant::{Measurement, Network};
 use crate::signal::SampleBlock;
 use crate::sim::ClosedLoop;
+use replay::Player;
 use worker::{Ports, Worker};
 
 /// Longest wait for the worker to end, when its session is dropped.
@@ -59,6 +63,8 @@ pub enum SessionCommand {
     Step,
     /// Times real time, 1 to 1000.
     Speed(f64),
+    /// Go to a time of the recording that is played, in seconds of its run.
+    Seek(f64),
     /// Start a new run on a rig.
     Load(Box<Rig>),
     /// Send everything from now on to a sink as well.
@@ -95,12 +101,21 @@ impl Session {
     /// # Panics
     /// When the system cannot start a thread.
     pub fn start(rig: &Rig, notify: Notify) -> Result<Self, CommandError> {
-        let closed =
-            ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed)?;
+        ClosedLoop::simulated(rig.network.clone(), rig.configuration, rig.measurement, rig.seed)
+            .map(|closed| Self::of(closed, notify))
+    }
+
+    /// Starts a worker on loops as they stand, paused.
+    ///
+    /// # Panics
+    /// When the system cannot start a thread.
+    #[must_use]
+    pub fn of(closed: ClosedLoop, notify: Notify) -> Self {
+        let network = closed.network().clone();
         let (commands, command_queue) = bounded(4096);
         let (block_queue, blocks) = bounded(256);
         let (event_queue, events) = bounded(4096);
-        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(rig.network.clone()))));
+        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(network))));
         let ports = Ports {
             commands: command_queue,
             blocks: block_queue,
@@ -116,7 +131,36 @@ impl Session {
             .name("vasos-session".to_owned())
             .spawn(move || worker.run())
             .expect("the system can start a thread");
-        Ok(Self { commands, blocks, events, latest, worker: Some(worker) })
+        Self { commands, blocks, events, latest, worker: Some(worker) }
+    }
+
+    /// Plays a recording, paused at its beginning. All its rows and events are delivered at once; snapshots show the
+    /// time that is played.
+    ///
+    /// # Panics
+    /// When the system cannot start a thread.
+    #[must_use]
+    pub fn replay(recorded: Arc<RecordedRun>, notify: Notify) -> Self {
+        let (commands, command_queue) = bounded(4096);
+        let (block_queue, blocks) = bounded(2);
+        let (event_queue, events) = bounded(recorded.events.len() + 64);
+        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(recorded.network.clone()))));
+        let ports = replay::Ports {
+            commands: command_queue,
+            blocks: block_queue,
+            events: event_queue,
+            latest: latest.clone(),
+            notify,
+        };
+        let player = Player::new(recorded, ports);
+        if let Ok(mut first) = latest.lock() {
+            *first = Arc::new(player.snapshot());
+        }
+        let worker = std::thread::Builder::new()
+            .name("vasos-replay".to_owned())
+            .spawn(move || player.run())
+            .expect("the system can start a thread");
+        Self { commands, blocks, events, latest, worker: Some(worker) }
     }
 
     /// Sends a command without waiting; false when the queue is full or the worker gone, and the command

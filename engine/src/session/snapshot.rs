@@ -126,6 +126,8 @@ pub struct Snapshot {
     pub faults: Vec<ActiveFault>,
     /// The test that runs on a loop.
     pub excitation: Option<ExcitationNow>,
+    /// First and last time in seconds of the recording that is played; `None` for a running rig.
+    pub span_s: Option<[f64; 2]>,
 }
 
 impl Snapshot {
@@ -151,6 +153,7 @@ impl Snapshot {
             alarms: vec![],
             faults: vec![],
             excitation: None,
+            span_s: None,
         }
     }
 }

@@ -9,7 +9,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError};
 use super::alarms::AlarmTable;
 use super::command::CommandError;
 use super::event::{Event, EventKind};
-use super::sink::Sink;
+use super::sink::{RunStart, Sink};
 use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 use super::{Notify, Rig, SessionCommand};
 use crate::control::Limits;
@@ -242,11 +242,12 @@ impl Worker {
                     self.say(EventKind::Refused(CommandError::Speed { speed }));
                 }
             }
+            SessionCommand::Seek(_) => self.say(EventKind::Refused(CommandError::NoReplay)),
             SessionCommand::Load(rig) => self.load(&rig),
             SessionCommand::Attach { id, mut sink } => {
                 // What was sampled before belongs to the others.
                 self.hand_to_sinks();
-                sink.started(self.run, self.closed.network(), self.closed.channels());
+                sink.started(&RunStart::of(&self.closed, self.run));
                 self.sinks.push((id, sink));
             }
             SessionCommand::Detach { id } => {
@@ -293,9 +294,8 @@ impl Worker {
                 };
                 self.fresh = empty.clone();
                 self.pending = empty;
-                let (network, channels) = (self.closed.network().clone(), self.closed.channels().clone());
-                let run = self.run;
-                self.tell_sinks(|sink| sink.started(run, &network, &channels));
+                let start = RunStart::of(&self.closed, self.run);
+                self.tell_sinks(|sink| sink.started(&start));
                 self.say(EventKind::RigLoaded { id: rig.network.spec.id.clone() });
             }
             Err(error) => self.say(EventKind::Refused(error)),
@@ -419,6 +419,7 @@ impl Worker {
             alarms: self.alarms.active(),
             faults: closed.source().faults().to_vec(),
             excitation: closed.excitation(),
+            span_s: None,
         }
     }
 }

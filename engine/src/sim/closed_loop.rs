@@ -8,7 +8,7 @@ use crate::control::{LoopSpec, Mode, check_filter, check_loop, execution_order, 
 use crate::daq::{RigControls, SimulatedRig, Source};
 use crate::excitation::StopReason;
 use crate::plant::{
-    ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, SteadyState,
+    ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, RigSpec, SteadyState,
     SteadyTarget, steady_at_level, steady_at_levels,
 };
 use crate::session::{CommandError, RigCommand};
@@ -140,6 +140,40 @@ impl ClosedLoop {
     #[must_use]
     pub fn loops(&self) -> &[ActiveLoop] {
         &self.loops
+    }
+
+    /// The rig's file with everything as it is set now: loops of every configuration, angles, levels.
+    #[must_use]
+    pub fn as_set(&self) -> RigSpec {
+        let mut spec = self.network.spec.clone();
+        for (configuration, loops) in spec.configurations.iter_mut().zip(&self.settings) {
+            configuration.loops.clone_from(loops);
+        }
+        if let Some(present) = spec.configurations.get_mut(self.configuration) {
+            present.loops = self.loops.iter().map(|l| l.spec.clone()).collect();
+        }
+        if let Some(plant) = self.source.plant() {
+            let present = spec.configurations.get_mut(self.configuration);
+            for (valve, &angle_deg) in spec.valves.iter_mut().zip(plant.angles_deg()) {
+                valve.angle_deg = angle_deg;
+            }
+            if let Some(present) = present {
+                // What a configuration says goes before what the parts themselves do.
+                present.start_steady = false;
+                for (id, angle_deg) in &mut present.angles_deg {
+                    if let Some(valve) = self.network.valve(id) {
+                        *angle_deg = plant.angles_deg()[valve];
+                    }
+                }
+            }
+            for (pump, &input) in spec.pumps.iter_mut().zip(plant.inputs()) {
+                pump.initial = input;
+            }
+            for (tank, &level_cm) in spec.tanks.iter_mut().zip(plant.levels_cm()) {
+                tank.initial_cm = level_cm;
+            }
+        }
+        spec
     }
 
     /// Last readings of the sensors.

@@ -208,6 +208,14 @@ pub(super) fn prepare(network: &Arc<Network>, scenario: &Scenario) -> Result<Pre
     Ok(Prepared { closed, events, samples: count as u64 + 1 })
 }
 
+/// The rig with its loops as a scenario starts them, before its first sample.
+///
+/// # Errors
+/// [`ScenarioError`] when the scenario cannot start.
+pub fn scenario_loop(network: &Arc<Network>, scenario: &Scenario) -> Result<ClosedLoop, ScenarioError> {
+    prepare(network, scenario).map(|prepared| prepared.closed)
+}
+
 /// Runs a scenario on a rig from start to end.
 ///
 /// # Errors

@@ -6,7 +6,8 @@ use super::assemble::Source;
 use super::merge::{Point, Series, merge};
 use super::read::{Kind, Read, ReadColumn};
 use super::{FileFormat, ImportError, Repair};
-use crate::recording::{RecordedColumn, read_recording};
+use crate::recording::{Parts, RecordedColumn, read_recording, read_runs};
+use vasos_engine::session::RecordedRun;
 
 /// Names of the values of a loop's component, in their order.
 const LOOP: [(&str, Option<&str>); 3] = [("sp", Some("cm")), ("pv", Some("cm")), ("mv", None)];
@@ -16,11 +17,20 @@ pub(super) fn is_recording(start: &[u8]) -> bool {
     start.starts_with(b"RRF")
 }
 
-/// Reads the longest run of a recording.
+/// Reads the longest run of a recording: its columns under their own names where it is of a rig, else by the entities
+/// that hold them.
 ///
 /// # Errors
 /// [`ImportError::Read`] for a recording that cannot be read or has no numbers in it.
 pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, Source), ImportError> {
+    if let Ok(runs) = read_runs(&Parts::of(path))
+        && let Some(run) = runs.iter().max_by_key(|run| run.len())
+    {
+        if runs.len() > 1 {
+            repairs.push(Repair::OtherRuns { run: run.name.clone(), others: runs.len() - 1 });
+        }
+        return Ok(read_rows(run));
+    }
     let all = read_recording(path).map_err(|error| ImportError::Read { reason: error.to_string() })?;
     let numeric = |c: &&RecordedColumn| c.values.iter().any(|v| !v.is_empty());
     let mut runs: Vec<&str> = all.iter().filter(numeric).map(|c| c.recording.as_str()).collect();
@@ -46,6 +56,20 @@ pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, 
     let lines = (1..=columns[0].values.len() as u32).collect();
     let source = Source { format: FileFormat::Recording, header_line: None, first_data_line: 1 };
     Ok((Read { columns, lines, stated_sample_time_s: None }, source))
+}
+
+fn read_rows(run: &RecordedRun) -> (Read, Source) {
+    let column = |name: String, unit: &str, values: Vec<f64>| {
+        let unit = Some(unit.to_owned()).filter(|unit| !unit.is_empty());
+        ReadColumn::new(name, unit, Kind::Number, values)
+    };
+    let mut columns = vec![column("time".to_owned(), "s", run.rows.time_s.clone())];
+    for (index, channel) in run.channels().channels.iter().enumerate() {
+        columns.push(column(channel.name.clone(), channel.unit, run.rows.column(index).collect()));
+    }
+    let lines = (1..=run.len() as u32).collect();
+    let source = Source { format: FileFormat::Recording, header_line: None, first_data_line: 1 };
+    (Read { columns, lines, stated_sample_time_s: None }, source)
 }
 
 /// The values of a component, a signal each.

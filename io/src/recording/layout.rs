@@ -2,8 +2,8 @@
 
 use rerun::blueprint::{
     Blueprint, BlueprintPanel, ComponentSourceKind, ContainerLike, Horizontal, SelectionPanel, Spatial2DView,
-    TextLogView, TimePanel, TimeSeriesView, Vertical, VisualizableArchetype, Visualizer,
-    VisualizerComponentMapping,
+    Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical, VisualizableArchetype,
+    Visualizer, VisualizerComponentMapping,
 };
 use rerun::external::re_sdk_types::blueprint::components::{PanelState, PlayState};
 use rerun::{Color, ComponentDescriptor, ComponentIdentifier, Scalars, SeriesLines};
@@ -22,6 +22,14 @@ pub const LEVELS: &str = "levels";
 pub const FLOWS: &str = "flows";
 /// Entity of the events.
 pub const EVENTS: &str = "events";
+/// Component of [`EVENTS`] with what a replay carries out.
+pub(super) const TOLD: &str = "told";
+/// Entity of the models that came into use.
+pub const MODELS: &str = "models";
+/// Entity above the fits of models: measured and modelled PV.
+pub const FITS: &str = "fits";
+/// Entity above the Nyquist curve of the loop in view.
+pub const NYQUIST: &str = "nyquist";
 /// Entity above the drawing of the tanks.
 pub const RIG: &str = "rig";
 
@@ -153,7 +161,8 @@ fn loop_title(network: &Network, slot: usize) -> String {
     tags.join(" / ")
 }
 
-/// How a viewer opens: trends on the left, the tanks and the events on the right. With it, the paths of the trends
+/// How a viewer opens: trends on the left, the tanks on the right, and below them tabs with events, Nyquist curve,
+/// model and fits. With it, the paths of the trends
 /// in the blueprint.
 pub(super) fn blueprint(groups: &[Group]) -> (Blueprint, Vec<String>) {
     let mut trends: Vec<ContainerLike> = Vec::new();
@@ -173,12 +182,18 @@ pub(super) fn blueprint(groups: &[Group]) -> (Blueprint, Vec<String>) {
     }
     let tanks = Spatial2DView::new("Tanks").with_origin(RIG).with_contents([format!("/{RIG}/**")]);
     let events = TextLogView::new("Events").with_origin(EVENTS).with_contents([format!("/{EVENTS}")]);
-    let right = Vertical::new([tanks.into(), events.into()]).with_row_shares([3.0, 2.0]);
+    let models = TextDocumentView::new("Model").with_origin(MODELS).with_contents([format!("/{MODELS}")]);
+    let fits: ContainerLike =
+        TimeSeriesView::new("Fits").with_origin(FITS).with_contents([format!("/{FITS}/**")]).into();
+    let nyquist =
+        Spatial2DView::new("Nyquist, −Im up").with_origin(NYQUIST).with_contents([format!("/{NYQUIST}/**")]);
     let view_path = |c: &ContainerLike| match c {
         ContainerLike::View(view) => Some(view.blueprint_path().to_string()),
         _ => None,
     };
-    let paths = trends.iter().filter_map(view_path).collect();
+    let paths = trends.iter().chain([&fits]).filter_map(view_path).collect();
+    let study = Tabs::new([events.into(), nyquist.into(), models.into(), fits]);
+    let right = Vertical::new([tanks.into(), study.into()]).with_row_shares([3.0, 2.0]);
     let left = Vertical::new(trends).with_row_shares(shares);
     let root = Horizontal::new([left.into(), right.into()]).with_column_shares([3.0, 2.0]);
     let time = TimePanel::new().with_timeline(TIME).with_play_state(PlayState::Following);

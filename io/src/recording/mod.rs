@@ -12,9 +12,13 @@
 //! | `/signals` | `levels` | true level of each tank | cm | every sample |
 //! | `/signals` | `flows` | for each pump its input and arriving flow, each valve its flow and angle, each tank its spill | pump's unit, cm³/s, cm³/s, °, cm³/s | every sample |
 //! | `/events` | `TextLog` | what happened, with level | – | as it happens |
+//! | `/events` | `told` | commands, alarms and states as TOML, for a replay | – | as it happens |
+//! | `/models` | `TextDocument`, `model` | the model that came into use: in words, and as TOML with its units | – | as it happens |
+//! | `/fits/model_N` | `Scalars` | PV as measured, PV of the model | the PV's | once a fit |
+//! | `/nyquist/…` | `LineStrips2D`, `Points2D` | L(jω), unit circle, circle of Ms, −1; −Im L points up | 1 | when the loop changes |
 //! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, when a level moves |
 //! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
-//! | `/__properties/vasos` | – | `rig`, `run`, `program` | – | once |
+//! | `/__properties/vasos` | text | `rig`, `run`, `program`; `rig_file`: the rig as it was set when the run began, a TOML rig file with the loops' laws, gains, setpoints and modes; `start`: configuration and imperfections | – | once |
 //!
 //! | timeline | kind | what it is |
 //! | --- | --- | --- |
@@ -24,15 +28,24 @@
 //! The signals share one entity because each entity costs some 1 kB a batch. The blueprint maps its components to lines
 //! and names them: the columns of [`vasos_engine::signal::ChannelSet`] with their
 //! units in brackets. A value that does not exist, such as the PV before the first sample, is NaN.
+//!
+//! A recording that grows over [`RecordingOptions::part_bytes`] goes on in another file. Each part opens by itself: it
+//! begins with the blueprint, the drawing, the settings and every command so far. Opened together, in the viewer or by
+//! [`read_runs`], parts are one recording.
 
 mod layout;
+mod notes;
 mod opening;
 mod output;
+mod play;
 mod read;
 mod run_sink;
 mod status;
 mod tanks;
+mod tidy;
+mod told;
 mod trouble;
+pub mod viewer;
 mod words;
 mod writer;
 
@@ -42,17 +55,20 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use rerun::grpc_server::GrpcServerSink;
 use rerun::{MemoryLimit, ServerOptions};
 use vasos_engine::session::Sink;
 
-pub use layout::{EVENTS, FLOWS, LEVELS, RIG, SIGNALS, TIME, WALL_CLOCK};
+pub use layout::{EVENTS, FITS, FLOWS, LEVELS, MODELS, NYQUIST, RIG, SIGNALS, TIME, WALL_CLOCK};
+pub use notes::{ModelNote, Note, NyquistNote};
+pub use play::{Parts, read_runs};
 pub use read::{RecordedColumn, read_recording};
 pub use trouble::{RecordingError, RecordingTrouble};
+pub use words::line as event_words;
 
 use output::Output;
-use run_sink::RunSink;
+use run_sink::{Message, RunSink};
 use status::Status;
 use writer::Writer;
 
@@ -60,8 +76,9 @@ use writer::Writer;
 const QUEUE: usize = 4096;
 /// What the server keeps for viewers that join later.
 const SERVER_BYTES: u64 = 128 * 1024 * 1024;
-/// A file larger than this is not optimised: that takes it into memory as a whole.
-const OPTIMISE_BYTES: u64 = 32 * 1024 * 1024;
+/// Size at which a recording goes on in another file, unless told otherwise: four hours of a rig with twenty channels
+/// at 5 Hz, and small enough to be tidied up in memory.
+const PART_BYTES: u64 = 32 * 1024 * 1024;
 /// Longest wait of [`Recording::close`].
 const CLOSE_LIMIT: Duration = Duration::from_secs(5);
 /// Rerun's own port, which viewers try first.
@@ -74,11 +91,13 @@ pub struct RecordingOptions {
     pub serve: bool,
     /// Port for them; `None` tries Rerun's own, 9876, then any free one.
     pub port: Option<u16>,
+    /// Size in bytes at which the recording goes on in another file: `run.rrd`, `run-2.rrd`, …; `None`: never.
+    pub part_bytes: Option<u64>,
 }
 
 impl Default for RecordingOptions {
     fn default() -> Self {
-        Self { serve: true, port: None }
+        Self { serve: true, port: None, part_bytes: Some(PART_BYTES) }
     }
 }
 
@@ -89,6 +108,7 @@ pub struct Recording {
     address: Option<String>,
     status: Arc<Status>,
     done: Receiver<()>,
+    notes: Option<Sender<Message>>,
     lost_reported: u64,
     behind_reported: u64,
 }
@@ -115,16 +135,17 @@ impl Recording {
         let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let (queue, messages) = bounded(QUEUE);
         let (said, done) = bounded::<()>(0);
-        let writer = Writer::new(messages, output, status.clone(), name);
+        let writer = Writer::new(messages, output, status.clone(), name, options.part_bytes);
         let spawned = std::thread::Builder::new().name("vasos-recorder".to_owned()).spawn(move || {
             writer.record();
             drop(said);
         });
         spawned.map_err(|error| RecordingError::Start { reason: error.to_string() })?;
+        let notes = Some(queue.clone());
         let sink = Box::new(RunSink { queue, status: status.clone() });
         let id = output::next_id();
         let path = path.to_owned();
-        Ok((Self { id, path, address, status, done, lost_reported: 0, behind_reported: 0 }, sink))
+        Ok((Self { id, path, address, status, done, notes, lost_reported: 0, behind_reported: 0 }, sink))
     }
 
     /// Number unique in this process, for attaching and detaching the sink.
@@ -133,10 +154,23 @@ impl Recording {
         self.id
     }
 
-    /// The file.
+    /// The file; the first one, where it goes on in others.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// All files of the recording, in order.
+    #[must_use]
+    pub fn parts(&self) -> Vec<PathBuf> {
+        self.status.parts()
+    }
+
+    /// Keeps something with the present run, at its present time. What comes while the recorder is behind is left out.
+    pub fn note(&self, note: Note) {
+        if let Some(notes) = &self.notes {
+            drop(notes.try_send(Message::Note(Box::new(note))));
+        }
     }
 
     /// Where a viewer joins: `rerun --connect ADDRESS`; `None` without a server.
@@ -157,10 +191,10 @@ impl Recording {
         self.status.lost.load(Ordering::Relaxed)
     }
 
-    /// Size of the file now, in bytes.
+    /// Size of the files now, in bytes; those that are full count as they were before they were tidied up.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.status.bytes.load(Ordering::Relaxed)
+        self.status.bytes.load(Ordering::Relaxed) + self.status.bytes_before.load(Ordering::Relaxed)
     }
 
     /// What went wrong since the last call.
@@ -186,6 +220,7 @@ impl Recording {
     /// # Errors
     /// [`RecordingTrouble::NotClosed`] when the disk does not answer in time, or the last write error.
     pub fn close(mut self) -> Result<(), RecordingTrouble> {
+        self.notes = None;
         self.status.closing.store(true, Ordering::Relaxed);
         let path = || self.path.display().to_string();
         if self.done.recv_timeout(CLOSE_LIMIT) == Err(crossbeam_channel::RecvTimeoutError::Timeout) {
@@ -197,8 +232,8 @@ impl Recording {
         if let Some(trouble) = self.troubles().into_iter().rfind(unwritten) {
             return Err(trouble);
         }
-        if self.bytes() <= OPTIMISE_BYTES {
-            optimise(&self.path);
+        if let Some(last) = self.parts().last() {
+            tidy::tidy(last);
         }
         Ok(())
     }
@@ -226,19 +261,4 @@ fn serve(output: &mut Output, port: Option<u16>) -> Result<String, String> {
         std::thread::sleep(Duration::from_millis(10));
     }
     Ok(address)
-}
-
-/// Rewrites a finished file with larger chunks and a footer; on any doubt it stays as it is.
-fn optimise(path: &Path) {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".optimising");
-    let beside = PathBuf::from(beside);
-    let profile = rerun::rrd::OptimizationProfile::OBJECT_STORE;
-    let better = rerun::rrd::optimize_file(path, &beside, &profile).is_ok() && {
-        let size = |p: &Path| std::fs::metadata(p).map_or(0, |m| m.len());
-        (1..=size(path)).contains(&size(&beside))
-    };
-    if !(better && std::fs::rename(&beside, path).is_ok()) {
-        drop(std::fs::remove_file(&beside));
-    }
 }

@@ -1,10 +1,13 @@
 //! Where messages of the recorder go: the file first, then the server for viewers, which can never hold the file up.
+//!
+//! One sink for both, rather than Rerun's `MultiSink` of `FileSink` and `GrpcServerSink`: those write on threads of
+//! their own that say nothing of a full disk, and a file cut in the middle of a message would stay so.
 
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crossbeam_channel::{Sender, TrySendError, bounded};
@@ -13,11 +16,14 @@ use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
 use super::status::Status;
+use super::tidy::tidy_beside;
 
 type Encoder = re_log_encoding::Encoder<File>;
 
 /// Messages that wait for the server before a viewer misses some.
 const SERVER_QUEUE: usize = 1024;
+/// Messages with commands that open every further part of a recording: hours of dragging.
+const MOST_KEPT: usize = 10_000;
 
 /// The file and the server of a recording; every run's stream has a handle on them.
 #[derive(Clone)]
@@ -27,19 +33,23 @@ pub(super) struct Output {
     status: Arc<Status>,
 }
 
+/// What becomes of the messages that come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Keep {
+    /// They are written.
+    Write,
+    /// They open the run: every further part of the file begins with them as well.
+    Open,
+    /// They carry settings that a replay of any later part needs.
+    Settings,
+}
+
 impl Output {
     /// Creates the file and writes its header.
     pub fn create(path: &Path, status: Arc<Status>) -> Result<Self, String> {
-        let file = File::create(path).map_err(|error| error.to_string())?;
-        let again = file.try_clone().map_err(|error| error.to_string())?;
-        let options = re_log_encoding::rrd::EncodingOptions::PROTOBUF_COMPRESSED;
-        let mut encoder = Encoder::new_eager(re_build_info::CrateVersion::LOCAL, options, file)
-            .map_err(|error| error.to_string())?;
-        // A footer would grow in memory with every batch for days; optimising at the end adds one.
-        encoder.do_not_emit_footer();
-        let mut disk = Disk { encoder, file: again, good_bytes: 0, missing: 0 };
-        disk.good_bytes = disk.file.stream_position().unwrap_or_default();
+        let disk = Disk::create(path)?;
         status.bytes.store(disk.good_bytes, Ordering::Relaxed);
+        status.add_part(path);
         Ok(Self { disk: Arc::new(Mutex::new(disk)), server: None, status })
     }
 
@@ -57,10 +67,46 @@ impl Output {
         Ok(())
     }
 
+    fn disk(&self) -> MutexGuard<'_, Disk> {
+        self.disk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says what becomes of the messages from now on. A run that opens takes the place of the one before.
+    pub fn keep(&self, keep: Keep) {
+        let mut disk = self.disk();
+        if keep == Keep::Open {
+            disk.opening.clear();
+        }
+        disk.keep = keep;
+    }
+
+    /// Goes on in a new file when this one has grown over a size; the one that is full is tidied up beside.
+    pub fn rotate_over(&self, most_bytes: u64) {
+        let mut disk = self.disk();
+        if disk.good_bytes < most_bytes {
+            return;
+        }
+        let next = match disk.next_part() {
+            Ok(next) => next,
+            Err(reason) => {
+                drop(disk);
+                return self.status.report_part(&reason);
+            }
+        };
+        let full = std::mem::replace(&mut *disk, next);
+        self.status.add_part(&disk.path);
+        self.status.bytes_before.fetch_add(full.good_bytes, Ordering::Relaxed);
+        self.status.bytes.store(disk.good_bytes, Ordering::Relaxed);
+        drop(disk);
+        let path = full.path.clone();
+        drop(full.file.sync_all());
+        drop(full);
+        tidy_beside(path);
+    }
+
     /// Makes sure that the system has all of the file.
     pub fn finish(&self) {
-        let disk = self.disk.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = disk.file.sync_all() {
+        if let Err(error) = self.disk().file.sync_all() {
             self.status.report_write(&error.to_string());
         }
     }
@@ -68,7 +114,8 @@ impl Output {
 
 impl LogSink for Output {
     fn send(&self, message: LogMsg) {
-        let mut disk = self.disk.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut disk = self.disk();
+        disk.remember(&message);
         match disk.append(&message) {
             Ok(missing) => {
                 self.status.bytes.store(disk.good_bytes, Ordering::Relaxed);
@@ -94,13 +141,77 @@ impl LogSink for Output {
 
 /// The file, always cut back to its last whole message.
 struct Disk {
+    path: PathBuf,
+    /// Name of the first part without its ending, for those that follow.
+    stem: PathBuf,
+    number: u32,
     encoder: Encoder,
     file: File,
     good_bytes: u64,
     missing: u64,
+    keep: Keep,
+    opening: Vec<LogMsg>,
 }
 
 impl Disk {
+    fn create(path: &Path) -> Result<Self, String> {
+        let file = File::create(path).map_err(|error| error.to_string())?;
+        Self::on(file, path, path.with_extension(""), 1, vec![])
+    }
+
+    fn on(
+        file: File,
+        path: &Path,
+        stem: PathBuf,
+        number: u32,
+        opening: Vec<LogMsg>,
+    ) -> Result<Self, String> {
+        let again = file.try_clone().map_err(|error| error.to_string())?;
+        let options = re_log_encoding::rrd::EncodingOptions::PROTOBUF_COMPRESSED;
+        let mut encoder = Encoder::new_eager(re_build_info::CrateVersion::LOCAL, options, file)
+            .map_err(|error| innermost(&error))?;
+        // A footer would grow in memory with every batch for days; optimising at the end adds one.
+        encoder.do_not_emit_footer();
+        let (path, keep) = (path.to_owned(), Keep::Write);
+        let mut disk =
+            Self { path, stem, number, encoder, file: again, good_bytes: 0, missing: 0, keep, opening };
+        disk.good_bytes = disk.file.stream_position().unwrap_or_default();
+        Ok(disk)
+    }
+
+    /// The next part, with everything that opens the run; a file that is there already is left alone.
+    fn next_part(&self) -> Result<Self, String> {
+        let mut number = self.number;
+        let (file, path) = loop {
+            number += 1;
+            let mut name = self.stem.clone().into_os_string();
+            name.push(format!("-{number}.rrd"));
+            let path = PathBuf::from(name);
+            match File::options().write(true).create_new(true).open(&path) {
+                Ok(file) => break (file, path),
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error.to_string()),
+            }
+        };
+        let made = Self::on(file, &path, self.stem.clone(), number, self.opening.clone()).and_then(|mut part| {
+            let opening = std::mem::take(&mut part.opening);
+            opening.iter().try_for_each(|message| part.append(message).map(drop))?;
+            part.opening = opening;
+            Ok(part)
+        });
+        if made.is_err() {
+            // Half an opening is of no use, and its name is wanted for the next attempt.
+            drop(std::fs::remove_file(&path));
+        }
+        made
+    }
+
+    fn remember(&mut self, message: &LogMsg) {
+        if self.keep != Keep::Write && self.opening.len() < MOST_KEPT {
+            self.opening.push(message.clone());
+        }
+    }
+
     /// Writes a message whole or not at all; gives how many were missed before it.
     fn append(&mut self, message: &LogMsg) -> Result<u64, String> {
         match self.encoder.append(message) {

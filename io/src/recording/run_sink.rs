@@ -5,20 +5,22 @@ use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
 use crossbeam_channel::{Sender, TrySendError};
-use vasos_engine::plant::Network;
-use vasos_engine::session::{Event, Sink};
-use vasos_engine::signal::{ChannelSet, SampleBlock};
+use vasos_engine::session::{Event, RunStart, Sink};
+use vasos_engine::signal::SampleBlock;
 
+use super::notes::Note;
 use super::status::Status;
 
 /// What the recorder is handed.
 pub(super) enum Message {
     /// A run begins, or goes on.
-    Run { run: u64, network: Arc<Network>, channels: Arc<ChannelSet> },
+    Run(Box<RunStart>),
     /// Rows, and when they came.
     Rows { block: SampleBlock, wall: SystemTime },
     /// An event, and when it came.
     Event { event: Event, wall: SystemTime },
+    /// Something to be kept with the run.
+    Note(Box<Note>),
 }
 
 pub(super) struct RunSink {
@@ -27,10 +29,9 @@ pub(super) struct RunSink {
 }
 
 impl Sink for RunSink {
-    fn started(&mut self, run: u64, network: &Arc<Network>, channels: &Arc<ChannelSet>) {
-        let message = Message::Run { run, network: network.clone(), channels: channels.clone() };
+    fn started(&mut self, start: &RunStart) {
         // Rows without their run are counted as lost by the recorder.
-        drop(self.queue.try_send(message));
+        drop(self.queue.try_send(Message::Run(Box::new(start.clone()))));
     }
 
     fn samples(&mut self, block: &SampleBlock) {

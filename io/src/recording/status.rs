@@ -1,5 +1,6 @@
 //! What a recorder says of itself, shared between its threads and its handle.
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -16,14 +17,18 @@ pub(super) struct Status {
     pub rows: AtomicU64,
     /// Rows it could not take.
     pub lost: AtomicU64,
-    /// Bytes of the file.
+    /// Bytes of the file that is written.
     pub bytes: AtomicU64,
+    /// Bytes of the parts before it, as they were when they were full.
+    pub bytes_before: AtomicU64,
     /// Messages no viewer got.
     pub behind: AtomicU64,
     /// The handle wants the recorder to end.
     pub closing: AtomicBool,
     writing_fails: AtomicBool,
     troubles: Mutex<Vec<RecordingTrouble>>,
+    parts: Mutex<Vec<PathBuf>>,
+    part_fails: AtomicBool,
 }
 
 impl Status {
@@ -48,6 +53,23 @@ impl Status {
     pub fn report_resumed(&self, count: u64) {
         self.writing_fails.store(false, Ordering::Relaxed);
         self.report(RecordingTrouble::Resumed { path: self.path.clone(), count });
+    }
+
+    /// Says once that no further part can begin, until one does.
+    pub fn report_part(&self, reason: &str) {
+        if !self.part_fails.swap(true, Ordering::Relaxed) {
+            self.report(RecordingTrouble::NoPart { path: self.path.clone(), reason: reason.to_owned() });
+        }
+    }
+
+    pub fn add_part(&self, path: &Path) {
+        self.part_fails.store(false, Ordering::Relaxed);
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+    }
+
+    /// Files of the recording, in order.
+    pub fn parts(&self) -> Vec<PathBuf> {
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     pub fn take_troubles(&self) -> Vec<RecordingTrouble> {

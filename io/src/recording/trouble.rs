@@ -33,6 +33,12 @@ pub enum RecordingError {
         /// File.
         path: String,
     },
+    /// Recorded by another program, or of a rig that is not known.
+    #[error("{path} holds no run of a rig; open it as a log to use its numbers")]
+    NoRig {
+        /// File.
+        path: String,
+    },
 }
 
 /// What goes wrong while recording; the run itself goes on.
@@ -50,6 +56,16 @@ pub enum RecordingTrouble {
     )]
     Write {
         /// File.
+        path: String,
+        /// The system's words.
+        reason: String,
+    },
+    /// A recording that should go on in another file cannot.
+    #[error(
+        "the recording {path} cannot go on in another file: {reason}; it grows on in the present one"
+    )]
+    NoPart {
+        /// First file.
         path: String,
         /// The system's words.
         reason: String,
@@ -99,6 +115,7 @@ impl Explain for RecordingError {
             Self::Start { .. } => "recording.start",
             Self::Read { .. } => "recording.read",
             Self::Nothing { .. } => "recording.nothing",
+            Self::NoRig { .. } => "recording.no_rig",
         }
     }
 
@@ -108,7 +125,7 @@ impl Explain for RecordingError {
                 vec![("path", path.clone()), ("reason", reason.clone())]
             }
             Self::Start { reason } => vec![("reason", reason.clone())],
-            Self::Nothing { path } => vec![("path", path.clone())],
+            Self::Nothing { path } | Self::NoRig { path } => vec![("path", path.clone())],
         }
     }
 }
@@ -123,6 +140,7 @@ impl RecordingError {
             Self::Start { reason: text("too many threads") },
             Self::Read { path: text("run.rrd"), reason: text("unknown version") },
             Self::Nothing { path: text("run.rrd") },
+            Self::NoRig { path: text("run.rrd") },
         ]
     }
 }
@@ -132,6 +150,7 @@ impl Explain for RecordingTrouble {
         match self {
             Self::RowsLost { .. } => "recording.rows_lost",
             Self::Write { .. } => "recording.write",
+            Self::NoPart { .. } => "recording.no_part",
             Self::Resumed { .. } => "recording.resumed",
             Self::Log { .. } => "recording.log",
             Self::NoServer { .. } => "recording.no_server",
@@ -143,7 +162,9 @@ impl Explain for RecordingTrouble {
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::RowsLost { count } | Self::ViewerBehind { count } => vec![("count", count.to_string())],
-            Self::Write { path, reason } => vec![("path", path.clone()), ("reason", reason.clone())],
+            Self::Write { path, reason } | Self::NoPart { path, reason } => {
+                vec![("path", path.clone()), ("reason", reason.clone())]
+            }
             Self::Resumed { path, count } => vec![("path", path.clone()), ("count", count.to_string())],
             Self::Log { reason } | Self::NoServer { reason } => vec![("reason", reason.clone())],
             Self::NotClosed { path, seconds } => {
@@ -161,6 +182,7 @@ impl RecordingTrouble {
         vec![
             Self::RowsLost { count: 120 },
             Self::Write { path: text("run.rrd"), reason: text("no space left on device") },
+            Self::NoPart { path: text("run.rrd"), reason: text("permission denied") },
             Self::Resumed { path: text("run.rrd"), count: 12 },
             Self::Log { reason: text("lengths differ") },
             Self::NoServer { reason: text("address in use") },

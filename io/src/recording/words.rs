@@ -6,8 +6,9 @@ use vasos_engine::excitation::Ending;
 use vasos_engine::explain::number;
 use vasos_engine::session::{Alarm, EventKind, RigCommand};
 
-/// Level and text of an event.
-pub(super) fn line(kind: &EventKind) -> (&'static str, String) {
+/// Level (of Rerun's text log) and English text of an event.
+#[must_use]
+pub fn line(kind: &EventKind) -> (&'static str, String) {
     let (info, warning) = (TextLogLevel::INFO, TextLogLevel::WARN);
     match kind {
         EventKind::RigLoaded { id } => (info, format!("rig {id} loaded")),
@@ -25,6 +26,7 @@ pub(super) fn line(kind: &EventKind) -> (&'static str, String) {
             Ending::Finished => (info, format!("{}: test finished", report.tag)),
             Ending::Stopped(reason) => (warning, format!("{}: test {reason}", report.tag)),
         },
+        EventKind::Recorded { words } => (info, words.clone()),
         EventKind::SamplesLost { count } => (warning, format!("{count} samples given up")),
         EventKind::EventsLost { count } => (warning, format!("{count} events given up")),
         EventKind::Stopped { reason } => (TextLogLevel::ERROR, format!("stopped by a defect: {reason}")),

@@ -5,17 +5,21 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};
-use rerun::{Boxes2D, RecordingStream, RecordingStreamBuilder, Scalars, TextLog, TimeColumn};
-use vasos_engine::plant::Network;
-use vasos_engine::session::Event;
+use rerun::{
+    Boxes2D, ComponentDescriptor, ComponentIdentifier, RecordingStream, RecordingStreamBuilder, Scalars,
+    TextLog, TimeColumn,
+};
+use vasos_engine::session::{Event, EventKind, RunStart};
 use vasos_engine::signal::{ChannelKind, ChannelSet, SampleBlock};
 
-use super::layout::{EVENTS, Group, RIG, SIGNALS, TIME, WALL_CLOCK, groups};
+use super::layout::{EVENTS, Group, RIG, SIGNALS, TIME, TOLD, WALL_CLOCK, groups};
+use super::notes::{self, Note};
 use super::opening::blueprint_messages;
-use super::output::Output;
+use super::output::{Keep, Output};
 use super::run_sink::Message;
 use super::status::Status;
 use super::tanks::Tanks;
+use super::told::{self, told};
 use super::trouble::RecordingTrouble;
 use super::words;
 
@@ -49,12 +53,23 @@ pub(super) struct Writer {
     wall_ns: Vec<i64>,
     values: Vec<f64>,
     events: Vec<(Event, i64)>,
+    notes: Vec<Note>,
+    /// Time of the last row or event in seconds.
+    now_s: f64,
+    part_bytes: Option<u64>,
 }
 
 impl Writer {
-    pub fn new(queue: Receiver<Message>, output: Output, status: Arc<Status>, name: String) -> Self {
+    pub fn new(
+        queue: Receiver<Message>,
+        output: Output,
+        status: Arc<Status>,
+        name: String,
+        part_bytes: Option<u64>,
+    ) -> Self {
         let (time_s, wall_ns, values) = (vec![], vec![], vec![]);
-        Self { queue, output, status, name, run: None, time_s, wall_ns, values, events: vec![] }
+        let (run, events, notes, now_s) = (None, vec![], vec![], 0.0);
+        Self { queue, output, status, name, run, time_s, wall_ns, values, events, notes, now_s, part_bytes }
     }
 
     /// Records until the sink is gone, or the handle closes.
@@ -86,14 +101,21 @@ impl Writer {
 
     fn take(&mut self, message: Message) {
         match message {
-            Message::Run { run, network, channels } => {
+            Message::Run(start) => {
                 self.flush();
-                if let Err(error) = self.begin(run, &network, channels) {
+                self.output.keep(Keep::Open);
+                let begun = self.begin(&start);
+                self.output.keep(Keep::Write);
+                if let Err(error) = begun {
                     self.report(&*error);
                 }
             }
             Message::Rows { block, wall } => self.gather(&block, wall),
-            Message::Event { event, wall } => self.events.push((event, nanoseconds(wall))),
+            Message::Event { event, wall } => {
+                self.now_s = event.time_s;
+                self.events.push((event, nanoseconds(wall)));
+            }
+            Message::Note(note) => self.notes.push(*note),
         }
     }
 
@@ -103,21 +125,23 @@ impl Writer {
             self.status.lost.fetch_add(block.time_s.len() as u64, Ordering::Relaxed);
             return;
         }
+        self.now_s = block.time_s.last().copied().unwrap_or(self.now_s);
         self.time_s.extend_from_slice(&block.time_s);
         self.wall_ns.resize(self.time_s.len(), nanoseconds(wall));
         self.values.extend_from_slice(&block.values);
     }
 
     /// Opens a recording for a run, in the same file.
-    fn begin(&mut self, number: u64, network: &Arc<Network>, channels: Arc<ChannelSet>) -> LogResult {
+    fn begin(&mut self, start: &RunStart) -> LogResult {
         self.run = None;
+        let RunStart { run: number, network, channels, .. } = start;
         let id = &network.spec.id;
         let stream = RecordingStreamBuilder::new("vasos")
             .enabled(true)
             .recording_name(format!("{} · {id} · run {}", self.name, number + 1))
             .buffered()?;
         stream.set_sink(Box::new(self.output.clone()));
-        let groups = groups(&channels, network);
+        let groups = groups(channels, network);
         for message in blueprint_messages(&groups)? {
             stream.record_msg(message);
         }
@@ -125,15 +149,11 @@ impl Writer {
         stream.log_static(format!("{RIG}/walls"), &tanks.walls(network))?;
         stream.log_static(format!("{RIG}/pipes"), &tanks.pipes(network))?;
         stream.log_static(format!("{RIG}/water"), &Tanks::water_style())?;
-        let about = rerun::AnyValues::default()
-            .with_component::<rerun::components::Text>("rig", [id.as_str()])
-            .with_component::<rerun::components::Text>("run", [number.to_string()])
-            .with_component::<rerun::components::Text>("program", ["Vasos"]);
-        stream.send_property("vasos", &about)?;
+        stream.send_property(told::PROPERTY, &told::property(start)?)?;
         let column = |tank| channels.column(ChannelKind::Level(tank));
         let levels = (0..network.tanks.len()).filter_map(column).collect();
         stream.flush_with_timeout(BATCH)?;
-        self.run = Some(Run { stream, channels, groups, levels, tanks });
+        self.run = Some(Run { stream, channels: channels.clone(), groups, levels, tanks });
         Ok(())
     }
 
@@ -141,12 +161,21 @@ impl Writer {
     fn flush(&mut self) {
         if let Some(run) = &mut self.run {
             let rows = Rows { time_s: &self.time_s, wall_ns: &self.wall_ns, values: &self.values };
-            let logged = run.log_rows(&rows).and_then(|()| run.log_events(&self.events));
+            let logged = run.log_rows(&rows).and_then(|()| run.log_notes(&self.notes, self.now_s));
             let flushed = logged.and_then(|()| Ok(run.stream.flush_with_timeout(5 * BATCH)?));
+            let settings = self.events.iter().any(|(event, _)| matches!(event.kind, EventKind::Done(_)));
+            self.output.keep(if settings { Keep::Settings } else { Keep::Write });
+            let logged = flushed.and_then(|()| run.log_events(&self.events));
+            let flushed = logged.and_then(|()| Ok(run.stream.flush_with_timeout(5 * BATCH)?));
+            self.output.keep(Keep::Write);
             if let Err(error) = flushed {
                 self.report(&*error);
             }
             self.events.clear();
+            self.notes.clear();
+            if let Some(most) = self.part_bytes {
+                self.output.rotate_over(most);
+            }
         }
         self.time_s.clear();
         self.wall_ns.clear();
@@ -226,6 +255,10 @@ impl Run {
         Ok(self.stream.send_columns(format!("{RIG}/water"), times, boxes.columns(lengths)?)?)
     }
 
+    fn log_notes(&self, notes: &[Note], now_s: f64) -> LogResult {
+        notes.iter().try_for_each(|note| notes::log(&self.stream, note, now_s))
+    }
+
     fn log_events(&self, events: &[(Event, i64)]) -> LogResult {
         if events.is_empty() {
             return Ok(());
@@ -236,7 +269,15 @@ impl Run {
             TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, events.iter().map(|(_, w)| *w)),
         ];
         let columns = TextLog::update_fields().with_many_text(texts).with_many_level(levels);
-        Ok(self.stream.send_columns(EVENTS, times, columns.columns_of_unit_batches()?)?)
+        let told = events.iter().map(|(event, _)| told(&event.kind));
+        let mut columns: Vec<_> = columns.columns_of_unit_batches()?.collect();
+        for mut column in TextLog::update_fields().with_many_text(told).columns_of_unit_batches()? {
+            let component = ComponentIdentifier::try_new(TOLD)?;
+            let component_type = column.descriptor.component_type;
+            column.descriptor = ComponentDescriptor { archetype: None, component, component_type };
+            columns.push(column);
+        }
+        Ok(self.stream.send_columns(EVENTS, times, columns)?)
     }
 }
 

@@ -15,12 +15,14 @@ pub struct Viewer {
 pub fn find(test: &str) -> Option<Viewer> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv");
     let venv = std::env::var_os("VASOS_VENV").map_or(root, PathBuf::from);
-    let program = venv.join("bin/rerun");
-    if !program.is_file() {
+    // The program itself: what pip puts into bin is a script beside it, and killing that leaves the viewer alone.
+    let site = venv.join("lib").read_dir().into_iter().flatten().flatten().map(|python| python.path());
+    let program = site.map(|s| s.join("site-packages/rerun_sdk/rerun_cli/rerun")).find(|p| p.is_file());
+    let Some(program) = program else {
         let why = "no viewer: python3 -m venv .venv && .venv/bin/pip install rerun-sdk==0.36.3";
         skip(test, why);
         return None;
-    }
+    };
     let viewer = Viewer { program, home: tempfile::tempdir().expect("a folder") };
     let status = viewer.command().args(["analytics", "disable"]).status();
     assert!(status.expect("the viewer starts").success());

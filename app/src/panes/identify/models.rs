@@ -41,10 +41,10 @@ fn row(ui: &mut egui::Ui, view: &View, entry: &ModelEntry, actions: &mut Vec<Act
     let from = match &entry.origin {
         ModelOrigin::Typed => tr!("identify.typed"),
         ModelOrigin::Run { tag, .. } => tag.clone(),
-        ModelOrigin::Log { name, .. } => name.clone(),
+        ModelOrigin::Log { name, .. } | ModelOrigin::Recording { name } => name.clone(),
     };
     let hover = match &entry.origin {
-        ModelOrigin::Typed => from.clone(),
+        ModelOrigin::Typed | ModelOrigin::Recording { .. } => from.clone(),
         ModelOrigin::Run { stretch, .. } | ModelOrigin::Log { stretch, .. } => {
             format!("{from}, {} … {}", text::clock(stretch.from_s), text::clock(stretch.to_s))
         }
