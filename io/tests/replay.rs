@@ -94,10 +94,13 @@ fn a_replay_shows_at_every_time_what_was_there() {
     let path = folder.path().join("run.rrd");
     let session = Session::of(loops("stad"), Box::new(|| ()));
     // A command before the recording begins belongs to its beginning.
-    send(&session, RigCommand::Tuning {
-        tag: tag(),
-        tuning: PidTuning::new(PidGains { kc: 2.5, ti_s: 80.0, td_s: 1.0, n: 8.0 }),
-    });
+    send(
+        &session,
+        RigCommand::Tuning {
+            tag: tag(),
+            tuning: PidTuning::new(PidGains { kc: 2.5, ti_s: 80.0, td_s: 1.0, n: 8.0 }),
+        },
+    );
     steps(&session, 10);
     let (recording, sink) = Recording::start(&path, FILE_ONLY).expect("records");
     assert!(session.send(SessionCommand::Attach { id: recording.id(), sink }));
@@ -137,7 +140,8 @@ fn a_replay_shows_at_every_time_what_was_there() {
         }
         assert_eq!(run.row_at(at_s), Some(row));
         for (tank, shown) in shown.tanks.iter().enumerate() {
-            let column = run.channels().column(vasos_engine::signal::ChannelKind::Level(tank)).expect("level");
+            let column =
+                run.channels().column(vasos_engine::signal::ChannelKind::Level(tank)).expect("level");
             assert_eq!(shown.level_cm, run.rows.row(row)[column]);
         }
     }
@@ -253,7 +257,10 @@ fn a_recording_that_grows_goes_on_in_files_that_open_by_themselves() {
     let (rows, lost, parts) = (recording.rows(), recording.lost(), recording.parts());
     close(&session, recording);
     assert!(parts.len() >= 3 && lost == 0, "{parts:?}, lost {lost}");
-    assert!(!parts.contains(&folder.path().join("run-3.rrd")), "a file that was there is left alone: {parts:?}");
+    assert!(
+        !parts.contains(&folder.path().join("run-3.rrd")),
+        "a file that was there is left alone: {parts:?}"
+    );
     // Parts are tidied up beside; until that is over they are as they were written.
     let whole = only_run(&path);
     assert_eq!(whole.len() as u64, rows);
@@ -288,9 +295,9 @@ fn of_a_file_that_was_cut_off_everything_whole_opens() {
         let (recording, mut sink) = Recording::start(&path, options).expect("records");
         sink.started(&start);
         let width = start.channels.len();
-        let time_s: Vec<f64> = (0..2000).map(|row| f64::from(row) * 0.2).collect();
-        let values: Vec<f64> = (0..2000 * width).map(|i| (i as f64 * 0.7153).sin()).collect();
-        for (t, v) in time_s.chunks(400).zip(values.chunks(400 * width)) {
+        let time_s: Vec<f64> = (0..800).map(|row| f64::from(row) * 0.2).collect();
+        let values: Vec<f64> = (0..800 * width).map(|i| (i as f64 * 0.7153).sin()).collect();
+        for (t, v) in time_s.chunks(200).zip(values.chunks(200 * width)) {
             let channels = start.channels.clone();
             sink.samples(&SampleBlock { run: 0, channels, time_s: t.to_vec(), values: v.to_vec() });
             std::thread::sleep(pause);
@@ -301,7 +308,7 @@ fn of_a_file_that_was_cut_off_everything_whole_opens() {
         SampleBlock { run: 0, channels: start.channels.clone(), time_s, values }
     };
     let optimised = folder.path().join("closed.rrd");
-    let of_closed = long_run(&optimised, 2000, FILE_ONLY, Duration::ZERO);
+    let of_closed = long_run(&optimised, 800, FILE_ONLY, Duration::ZERO);
     for (path, whole) in [(&path, &whole), (&optimised, &of_closed)] {
         let bytes = std::fs::read(path).expect("a file");
         let cut = folder.path().join("cut/run.rrd");
@@ -327,7 +334,9 @@ fn of_a_file_that_was_cut_off_everything_whole_opens() {
                     assert_eq!(before, 0, "{end} bytes: {error}");
                     let in_words = matches!(
                         error,
-                        RecordingError::Read { .. } | RecordingError::Nothing { .. } | RecordingError::NoRig { .. }
+                        RecordingError::Read { .. }
+                            | RecordingError::Nothing { .. }
+                            | RecordingError::NoRig { .. }
                     );
                     assert!(in_words, "{error}");
                 }

@@ -129,9 +129,14 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     let sample_time_s = closed.sample_time_s();
     let session = Session::of(closed, Box::new(|| {}));
     if let Some(address) = recording.address() {
-        eprintln!("vasos: recording to {}; a viewer joins with: rerun --connect {address}", arguments.output.display());
+        eprintln!(
+            "vasos: recording to {}; a viewer joins with: rerun --connect {address}",
+            arguments.output.display()
+        );
     }
-    let send = |command| if session.send(command) { Ok(()) } else { Err(Refusal("the run does not answer".to_owned())) };
+    let send = |command| {
+        if session.send(command) { Ok(()) } else { Err(Refusal("the run does not answer".to_owned())) }
+    };
     send(SessionCommand::Attach { id: recording.id(), sink })?;
     send(SessionCommand::Speed(arguments.speed))?;
     send_due(&mut events, 0.0, &send)?;

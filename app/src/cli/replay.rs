@@ -187,7 +187,11 @@ fn run_text(number: usize, run: &RecordedRun, path: &Path, with_events: bool) ->
     }
     if with_events {
         for event in &run.events {
-            text.push_str(&format!("  {:>10} s  {}\n", shown(Some(event.time_s)), event_words(&event.kind).1));
+            text.push_str(&format!(
+                "  {:>10} s  {}\n",
+                shown(Some(event.time_s)),
+                event_words(&event.kind).1
+            ));
         }
     }
     text

@@ -10,8 +10,8 @@ use vasos_engine::plant::Network;
 use vasos_engine::session::{Event, EventKind, RunStart};
 use vasos_engine::signal::SampleBlock;
 use vasos_engine::sim::{LoopFigures, Run, Scenario, run_scenario, scenario_loop};
-use vasos_io::recording::{Recording, RecordingOptions};
 use vasos_io::export::write_run;
+use vasos_io::recording::{Recording, RecordingOptions};
 use vasos_io::rig::load_scenario;
 
 use super::json::{self, shown, table};

@@ -178,7 +178,8 @@ impl Workbench {
                 ui.label(RichText::new(words).monospace());
                 let mut time_s = snapshot.time_s;
                 ui.spacing_mut().slider_width = (ui.available_width() - 8.0).max(60.0);
-                let slider = egui::Slider::new(&mut time_s, from_s..=to_s.max(from_s + 1e-9)).show_value(false);
+                let slider =
+                    egui::Slider::new(&mut time_s, from_s..=to_s.max(from_s + 1e-9)).show_value(false);
                 let slider = ui.add(slider).on_hover_text(tr!("replay.scrub_hint"));
                 slider.widget_info(|| egui::WidgetInfo::slider(true, time_s, tr!("replay.scrub")));
                 if slider.changed() {

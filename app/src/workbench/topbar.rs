@@ -44,9 +44,15 @@ impl Workbench {
                 if spec.configurations.len() > 1 {
                     let titles: Vec<String> =
                         spec.configurations.iter().map(|c| c.title.get(language).to_owned()).collect();
-                    if let Some(i) =
-                        segmented(ui, &tr!("top.configuration"), &titles, document.rig.configuration)
-                    {
+                    // A recording shows which one it was at its time.
+                    let replay = snapshot.span_s.is_some();
+                    let chosen = if replay { snapshot.configuration } else { document.rig.configuration };
+                    let clicked = ui
+                        .add_enabled_ui(!replay, |ui| {
+                            segmented(ui, &tr!("top.configuration"), &titles, chosen)
+                        })
+                        .inner;
+                    if let Some(i) = clicked {
                         actions.push(Action::Document(DocumentCommand::Configuration(i)));
                     }
                 }
@@ -246,12 +252,14 @@ impl Workbench {
                 let sample_ms = document.rig.network.spec.sample_time_s * 1000.0;
                 let balance =
                     if snapshot.balance_error_cm3.abs() < 5e-5 { 0.0 } else { snapshot.balance_error_cm3 };
-                let parts = [
+                let mut parts = vec![
                     state,
                     format!("t {}", text::clock(snapshot.time_s)),
                     tr!("status.sample", ms = text::brief(sample_ms)),
-                    tr!("status.balance", error = text::fixed(balance, 4)),
                 ];
+                if snapshot.span_s.is_none() {
+                    parts.push(tr!("status.balance", error = text::fixed(balance, 4)));
+                }
                 ui.label(small(parts.join("  ·  ")));
                 if let Some(alarm) = snapshot.alarms.first() {
                     let more = snapshot.alarms.len() - 1;

@@ -177,7 +177,8 @@ impl Player {
 
     /// Carries out what happened up to the present time.
     fn catch_up(&mut self) {
-        while let Some(event) = self.recorded.events.get(self.next_event).filter(|e| e.time_s <= self.time_s) {
+        while let Some(event) = self.recorded.events.get(self.next_event).filter(|e| e.time_s <= self.time_s)
+        {
             self.next_event += 1;
             match &event.kind {
                 // Tests move a loop over its settings and leave them as they were.
@@ -226,9 +227,8 @@ impl Player {
             angle_deg: value(ChannelKind::Angle(i)),
             flow_cm3_s: value(ChannelKind::ValveFlow(i)),
         };
-        let numbers = |slot| {
-            [ChannelKind::Setpoint(slot), ChannelKind::Pv(slot), ChannelKind::Mv(slot)].map(value)
-        };
+        let numbers =
+            |slot| [ChannelKind::Setpoint(slot), ChannelKind::Pv(slot), ChannelKind::Mv(slot)].map(value);
         Snapshot {
             run: recorded.rows.run,
             time_s: self.time_s,

@@ -23,7 +23,8 @@ pub use excite::ExcitationNow;
 pub use figures::LoopFigures;
 pub use real_rig::{LevelResistance, record_real_rig};
 pub use scenario::{
-    Run, Scenario, ScenarioError, Start, run_excitation, run_scenario, run_scenario_while, scenario_loop, scenario_start,
+    Run, Scenario, ScenarioError, Start, run_excitation, run_scenario, run_scenario_while, scenario_loop,
+    scenario_start,
 };
 pub use scenario_event::ScenarioEvent;
 pub use start::{StartError, check_starts};

@@ -62,11 +62,8 @@ pub(super) fn log(stream: &RecordingStream, note: &Note, time_s: f64) -> LogResu
 
 fn log_model(stream: &RecordingStream, note: &ModelNote, time_s: f64) -> LogResult {
     stream.set_duration_secs(TIME, time_s);
-    let told = ToldModel {
-        pv_unit: note.pv_unit.clone(),
-        mv_unit: note.mv_unit.clone(),
-        model: note.model.clone(),
-    };
+    let told =
+        ToldModel { pv_unit: note.pv_unit.clone(), mv_unit: note.mv_unit.clone(), model: note.model.clone() };
     stream.log(MODELS, &TextDocument::from_markdown(note.words.as_str()))?;
     let told = rerun::AnyValues::default()
         .with_component::<rerun::components::Text>(MODEL, [toml::to_string(&told)?]);

@@ -159,13 +159,7 @@ impl Disk {
         Self::on(file, path, path.with_extension(""), 1, vec![])
     }
 
-    fn on(
-        file: File,
-        path: &Path,
-        stem: PathBuf,
-        number: u32,
-        opening: Vec<LogMsg>,
-    ) -> Result<Self, String> {
+    fn on(file: File, path: &Path, stem: PathBuf, number: u32, opening: Vec<LogMsg>) -> Result<Self, String> {
         let again = file.try_clone().map_err(|error| error.to_string())?;
         let options = re_log_encoding::rrd::EncodingOptions::PROTOBUF_COMPRESSED;
         let mut encoder = Encoder::new_eager(re_build_info::CrateVersion::LOCAL, options, file)
@@ -193,12 +187,13 @@ impl Disk {
                 Err(error) => return Err(error.to_string()),
             }
         };
-        let made = Self::on(file, &path, self.stem.clone(), number, self.opening.clone()).and_then(|mut part| {
-            let opening = std::mem::take(&mut part.opening);
-            opening.iter().try_for_each(|message| part.append(message).map(drop))?;
-            part.opening = opening;
-            Ok(part)
-        });
+        let made =
+            Self::on(file, &path, self.stem.clone(), number, self.opening.clone()).and_then(|mut part| {
+                let opening = std::mem::take(&mut part.opening);
+                opening.iter().try_for_each(|message| part.append(message).map(drop))?;
+                part.opening = opening;
+                Ok(part)
+            });
         if made.is_err() {
             // Half an opening is of no use, and its name is wanted for the next attempt.
             drop(std::fs::remove_file(&path));

@@ -114,12 +114,10 @@ fn belonging(stores: &[Store]) -> Vec<bool> {
 }
 
 /// Hands over what each message is of: the id of its recording, its name where it opens, its chunk where it is one.
-fn read_messages(
-    path: &Path,
-    mut take: impl FnMut(&str, Option<&str>, Option<Chunk>),
-) -> Result<(), String> {
+fn read_messages(path: &Path, mut take: impl FnMut(&str, Option<&str>, Option<Chunk>)) -> Result<(), String> {
     let file = File::open(path).map_err(|error| error.to_string())?;
-    let messages = Decoder::<LogMsg>::decode_eager(BufReader::new(file)).map_err(|error| error.to_string())?;
+    let messages =
+        Decoder::<LogMsg>::decode_eager(BufReader::new(file)).map_err(|error| error.to_string())?;
     for message in messages {
         // The rest of a file that was cut off.
         let Ok(message) = message else { return Ok(()) };
@@ -307,7 +305,9 @@ fn block(mut parts: Vec<Rows>, network: &Network, run: u64) -> SampleBlock {
     for rows in &parts {
         let first = time_s.len();
         for group in &groups {
-            let Some((_, of_row, cells)) = rows.columns.iter().find(|c| c.0 == group.component) else { continue };
+            let Some((_, of_row, cells)) = rows.columns.iter().find(|c| c.0 == group.component) else {
+                continue;
+            };
             for (row, cells) in cells.chunks(*of_row.max(&1)).enumerate() {
                 for (&column, &cell) in group.columns.iter().zip(cells) {
                     values[(first + row) * width + column] = cell;

@@ -61,9 +61,7 @@ pub enum RecordingTrouble {
         reason: String,
     },
     /// A recording that should go on in another file cannot.
-    #[error(
-        "the recording {path} cannot go on in another file: {reason}; it grows on in the present one"
-    )]
+    #[error("the recording {path} cannot go on in another file: {reason}; it grows on in the present one")]
     NoPart {
         /// First file.
         path: String,

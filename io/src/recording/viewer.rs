@@ -90,7 +90,8 @@ pub fn find() -> Result<PathBuf, ViewerError> {
 fn places() -> Vec<PathBuf> {
     let name = format!("rerun{}", std::env::consts::EXE_SUFFIX);
     let bin = if cfg!(windows) { "Scripts" } else { "bin" };
-    let mut folders: Vec<PathBuf> = std::env::var_os("VIRTUAL_ENV").map(|v| PathBuf::from(v).join(bin)).into_iter().collect();
+    let mut folders: Vec<PathBuf> =
+        std::env::var_os("VIRTUAL_ENV").map(|v| PathBuf::from(v).join(bin)).into_iter().collect();
     folders.extend(std::env::var_os("PATH").iter().flat_map(|path| std::env::split_paths(path)));
     let here = std::env::current_dir().ok();
     let program = std::env::current_exe().ok();

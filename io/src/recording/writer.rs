@@ -24,7 +24,7 @@ use super::trouble::RecordingTrouble;
 use super::words;
 
 /// Wall time between two batches.
-const BATCH: Duration = Duration::from_secs(1);
+const BATCH: Duration = Duration::from_millis(900);
 /// Rows that make a batch before its time.
 const MOST_ROWS: usize = 10_000;
 /// Frames of the drawing in a batch.

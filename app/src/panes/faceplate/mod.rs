@@ -39,10 +39,14 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 4.0;
         ui.spacing_mut().button_padding.x = 5.0;
+        // What was recorded can be looked at, and at another loop of it.
+        let recorded = view.snapshot.span_s.is_some();
         heading(ui, view, state, now, &mut actions);
         bars(ui, view, now);
-        setpoint_keys(ui, view, now, &mut actions);
-        tuning::ui(ui, view, state, now, &mut actions);
+        ui.add_enabled_ui(!recorded, |ui| {
+            setpoint_keys(ui, view, now, &mut actions);
+            tuning::ui(ui, view, state, now, &mut actions);
+        });
         alarms(ui, view, now);
     });
     actions
@@ -67,7 +71,10 @@ fn heading(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, act
         }
         let chosen = modes.iter().position(|(_, m)| *m == now.mode).unwrap_or(0);
         let names: Vec<String> = modes.iter().map(|(name, _)| name.clone()).collect();
-        if let Some(chosen) = segmented(ui, &tr!("faceplate.mode"), &names, chosen) {
+        let recorded = view.snapshot.span_s.is_some();
+        let clicked =
+            ui.add_enabled_ui(!recorded, |ui| segmented(ui, &tr!("faceplate.mode"), &names, chosen)).inner;
+        if let Some(chosen) = clicked {
             actions.push(Action::Document(DocumentCommand::Mode(now.tag.clone(), modes[chosen].1)));
         }
     });

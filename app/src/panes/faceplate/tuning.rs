@@ -15,18 +15,25 @@ use crate::{i18n, text, theme, tr};
 /// Draws law, gains, weight and filter.
 pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State, now: &LoopNow, actions: &mut Vec<Action>) {
     let Some(settings) = view.document.rig.loops.get(&now.tag) else { return };
+    // A recording has had several settings, and shows those of its time.
+    let replay = view.snapshot.span_s.is_some();
+    let (law_now, tuning, filter_now_s) = if replay {
+        (now.law, now.tuning, now.pv_filter_s)
+    } else {
+        (settings.law, settings.tuning, settings.pv_filter_s)
+    };
     law(ui, state, now, actions);
-    if !settings.law.is_pid() {
+    if !law_now.is_pid() {
         return;
     }
     let unit = text::quotient(mv_unit(view, now), "cm");
-    let mut edited = settings.tuning;
-    let mut filter_s = settings.pv_filter_s;
+    let mut edited = tuning;
+    let mut filter_s = filter_now_s;
     let mut fields = Fields { width: ((ui.available_width() - 72.0) / 2.0).clamp(48.0, 84.0), done: false };
     let mut changed = false;
     let mut filter_changed = false;
     ui.style_mut().drag_value_text_style = egui::TextStyle::Small;
-    let shown = FormGains::Ideal(settings.tuning.gains).to_form(state.form);
+    let shown = FormGains::Ideal(tuning.gains).to_form(state.form);
     egui::Grid::new("tuning").min_col_width(14.0).num_columns(4).spacing([4.0, 2.0]).show(ui, |ui| {
         match shown {
             Ok(mut gains) => {
