@@ -306,3 +306,38 @@ fn a_simulated_scenario_goes_out_as_csv_parquet_and_recording_alike() {
         }
     }
 }
+
+/// The viewer is a program of its own: a stand-in that writes down how it was called shows what would be started.
+#[cfg(unix)]
+#[test]
+fn a_recording_is_opened_in_the_viewer_that_is_named_or_the_reader_is_told_how_to_get_one() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let scenario = file("run.toml");
+    std::fs::write(&scenario, "schema = 1\nrig = \"simtank1\"\nduration_s = 10.0\n").expect("written");
+    let rrd = file("run.rrd").display().to_string();
+    let made = vasos(&["simulate", &scenario.display().to_string(), "-o", &rrd]);
+    assert_eq!(made.status.code(), Some(0), "{}", said(&made));
+    let (viewer, called) = (file("rerun"), file("called"));
+    // Built-in words only: there is no path.
+    let script = format!("#!/bin/sh\necho \"$@\" >{}\n", called.display());
+    std::fs::write(&viewer, script).expect("written");
+    std::fs::set_permissions(&viewer, std::fs::Permissions::from_mode(0o755)).expect("executable");
+    let open = |viewer: &Path| {
+        let mut command = Command::new(PROGRAM);
+        // Nothing of this computer's own is found.
+        command.env("VASOS_RERUN", viewer).env("PATH", "/nowhere").env("HOME", folder.path());
+        command.env_remove("VIRTUAL_ENV").current_dir(folder.path()).args(["replay", &rrd, "--open"]);
+        command.output().expect("the program starts")
+    };
+    let opened = open(&viewer);
+    assert_eq!(opened.status.code(), Some(0), "{}", said(&opened));
+    let limit = Instant::now() + Duration::from_secs(10);
+    let mut arguments = String::new();
+    while !arguments.ends_with('\n') && Instant::now() < limit {
+        std::thread::sleep(Duration::from_millis(20));
+        arguments = std::fs::read_to_string(&called).unwrap_or_default();
+    }
+    assert_eq!(arguments.trim(), format!("--bind 127.0.0.1 --port 0 {rrd}"));
+}

@@ -9,12 +9,16 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use skip::skip;
+use vasos_engine::analyze::{CurveOptions, LoopFunction, OpenLoop, frequency_curve};
+use vasos_engine::control::PidGains;
+use vasos_engine::model::{Fopdt, ProcessModel};
 use vasos_engine::plant::Measurement;
 use vasos_engine::session::{Rig, RigCommand, Session, SessionCommand};
 use vasos_engine::signal::ChannelKind;
 use vasos_io::log::{FileFormat, ImportOptions, open_log};
 use vasos_io::recording::{
-    RecordedColumn, Recording, RecordingError, RecordingOptions, RecordingTrouble, read_recording,
+    ModelNote, Note, NyquistNote, RecordedColumn, Recording, RecordingError, RecordingOptions,
+    RecordingTrouble, read_recording,
 };
 use vasos_io::rig::preset;
 
@@ -253,6 +257,24 @@ fn the_file_opens_laid_out_in_the_viewer() {
     let setpoint = |level_cm| RigCommand::Setpoint { tag: "LIC-02".to_owned(), level_cm };
     assert!(session.send(SessionCommand::Rig(setpoint(18.0))));
     std::thread::sleep(Duration::from_millis(2500));
+    let model = ProcessModel::Fopdt(Fopdt { gain: 4.9, time_constant_s: 152.0, dead_time_s: 2.0 });
+    let open = OpenLoop::new(&model, &PidGains { kc: 1.8, ti_s: 152.0, td_s: 0.0, n: 10.0 });
+    let curve = frequency_curve(&open, LoopFunction::OpenLoop, &CurveOptions::default());
+    let fitted =
+        |row: i32| [f64::from(row), 15.0 + 0.1 * f64::from(row).sqrt(), 15.05 + 0.1 * f64::from(row).sqrt()];
+    recording.note(Note::Model(ModelNote {
+        number: 1,
+        words: format!("**Model 1**\n\n{model}"),
+        model,
+        pv_unit: "cm".to_owned(),
+        mv_unit: "V".to_owned(),
+        rows: (0..200).map(fitted).collect(),
+    }));
+    recording.note(Note::Nyquist(NyquistNote {
+        words: "LIC-02: Kc 1.8, Ti 152 s".to_owned(),
+        curve: curve.iter().map(|(_, l)| [l.re, l.im]).collect(),
+        ms: Some(1.14),
+    }));
     assert!(session.send(SessionCommand::Rig(setpoint(31.0))));
     assert!(session.send(SessionCommand::Rig(setpoint(12.0))));
     std::thread::sleep(Duration::from_millis(2500));

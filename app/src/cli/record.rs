@@ -29,7 +29,8 @@ Examples:
   vasos record run.toml -o run.rrd --part-mb 100      a scenario, with its start and its commands
 A viewer joins while it runs: rerun --connect ADDRESS, with the address that is printed at the start. What goes wrong is
 said on standard error at once; the run goes on. A recording that grows over --part-mb goes on in run-2.rrd, run-3.rrd, …
-JSON: {files, bytes, rows, lost, end_time_s}.")]
+JSON: {files, bytes, rows, lost, unwritten, end_time_s}; lost: rows that the recorder could not take, unwritten: batches
+that the disk did not take. Either makes the exit status 1.")]
 pub struct Arguments {
     /// Preset, rig file or scenario file (TOML).
     #[arg(default_value = "stad")]
@@ -174,18 +175,20 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     for trouble in recording.troubles() {
         eprintln!("vasos: {trouble}");
     }
+    let unwritten = recording.unwritten();
     let closed = recording.close();
     let bytes: u64 = files.iter().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
     let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
     let text = if arguments.json {
         json::text(&json!({
-            "files": names, "bytes": bytes, "rows": rows, "lost": lost, "end_time_s": end_time_s,
+            "files": names, "bytes": bytes, "rows": rows, "lost": lost, "unwritten": unwritten,
+            "end_time_s": end_time_s,
         }))
     } else {
         format!("{rows} rows to {end_time_s} s in {bytes} bytes: {}", names.join(", "))
     };
     let remarks: Vec<String> = closed.err().map(|trouble| trouble.to_string()).into_iter().collect();
-    let status = u8::from(lost > 0 || !remarks.is_empty() || refusals > 0);
+    let status = u8::from(lost > 0 || unwritten > 0 || !remarks.is_empty() || refusals > 0);
     Ok(Answer { text, remarks, status })
 }
 

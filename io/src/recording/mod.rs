@@ -191,6 +191,12 @@ impl Recording {
         self.status.lost.load(Ordering::Relaxed)
     }
 
+    /// Messages that the file did not take, because the disk was full or gone.
+    #[must_use]
+    pub fn unwritten(&self) -> u64 {
+        self.status.unwritten.load(Ordering::Relaxed)
+    }
+
     /// Size of the files now, in bytes; those that are full count as they were before they were tidied up.
     #[must_use]
     pub fn bytes(&self) -> u64 {

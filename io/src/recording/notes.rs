@@ -111,10 +111,8 @@ fn log_nyquist(stream: &RecordingStream, note: &NyquistNote, time_s: f64) -> Log
         (0..=CIRCLE).map(|k| [(-1.0 + radius * at(k).cos()) as f32, (radius * at(k).sin()) as f32]).collect()
     };
     let unit: Vec<[f32; 2]> = circle(1.0).iter().map(|[x, y]| [x + 1.0, *y]).collect();
-    let unit = LineStrips2D::new([unit])
-        .with_colors([Color::from_rgb(120, 125, 135)])
-        .with_radii([0.004_f32])
-        .with_labels(["unit circle"]);
+    let unit =
+        LineStrips2D::new([unit]).with_colors([Color::from_rgb(120, 125, 135)]).with_radii([0.004_f32]);
     stream.log(format!("{NYQUIST}/unit_circle"), &unit)?;
     if let Some(ms) = note.ms.filter(|ms| ms.is_finite() && *ms > 0.0) {
         let ring = LineStrips2D::new([circle(1.0 / ms)])
@@ -125,10 +123,8 @@ fn log_nyquist(stream: &RecordingStream, note: &NyquistNote, time_s: f64) -> Log
     } else {
         stream.log(format!("{NYQUIST}/ms"), &rerun::Clear::flat())?;
     }
-    let point = Points2D::new([[-1.0_f32, 0.0]])
-        .with_colors([Color::from_rgb(240, 120, 130)])
-        .with_radii([0.03_f32])
-        .with_labels(["−1"]);
+    let point =
+        Points2D::new([[-1.0_f32, 0.0]]).with_colors([Color::from_rgb(240, 120, 130)]).with_radii([0.03_f32]);
     stream.log(format!("{NYQUIST}/critical"), &point)?;
     stream.reset_time();
     Ok(())

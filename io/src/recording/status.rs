@@ -23,6 +23,8 @@ pub(super) struct Status {
     pub bytes_before: AtomicU64,
     /// Messages no viewer got.
     pub behind: AtomicU64,
+    /// Messages that the file did not take.
+    pub unwritten: AtomicU64,
     /// The handle wants the recorder to end.
     pub closing: AtomicBool,
     writing_fails: AtomicBool,
@@ -45,6 +47,7 @@ impl Status {
 
     /// Says once that the file takes no data, until it does again.
     pub fn report_write(&self, reason: &str) {
+        self.unwritten.fetch_add(1, Ordering::Relaxed);
         if !self.writing_fails.swap(true, Ordering::Relaxed) {
             self.report(RecordingTrouble::Write { path: self.path.clone(), reason: reason.to_owned() });
         }

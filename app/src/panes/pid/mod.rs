@@ -82,7 +82,13 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     }
     paint::faults(ui.painter(), &model, &p);
     rig_ui(ui, view, rect, &mut actions);
-    paint::hint(ui.painter(), rect, &tr!("pid.hint"), &p);
+    let recorded = view.snapshot.span_s.is_some();
+    let hint = if recorded { tr!("pid.recorded_hint") } else { tr!("pid.hint") };
+    paint::hint(ui.painter(), rect, &hint, &p);
+    if recorded {
+        // Views of it may change, what happened may not.
+        actions.retain(|action| !matches!(action, Action::Document(_) | Action::Rig(_) | Action::Seal));
+    }
     actions
 }
 
