@@ -3,7 +3,7 @@
 use super::fit_structure::{fit_on, with_drift_where_due};
 use super::model_fit::ModelFit;
 use super::output_error::Near;
-use super::problem::{Drift, FitProblem};
+use super::problem::{Drift, FitProblem, Stretch};
 use super::{FitError, FitVerdict, Structure};
 
 /// Several structures on one stretch, best first.
@@ -82,25 +82,37 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     for &structure in structures {
         let point = |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
         let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
-        let near = Near { first: point(Structure::Fopdt), same };
+        let reach_s = fits.iter().find(|f| f.structure == Structure::Fopdt).map(|f| f.reach_s);
+        let near = Near { first: point(Structure::Fopdt), same, reach_s };
         match fit_on(problem, &stretch, structure, drift, &near) {
             Ok(fit) => fits.push(fit),
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
-    let Some(least) = fits.iter().map(|f| f.mse).min_by(f64::total_cmp) else {
+    let alike = alike(&fits, &stretch);
+    let Some(least) = alike.iter().map(|a| a.mse).min_by(f64::total_cmp) else {
         return Err(first_error.unwrap_or(FitError::TooFewSamples { rows: stretch.len(), needed: 0 }));
     };
-    let best = fits.iter().find(|f| f.mse == least).map_or(1.0, |f| f.tests.rows_per_independent);
+    let best = fits
+        .iter()
+        .zip(&alike)
+        .find(|(_, a)| a.mse == least)
+        .map_or(1.0, |(f, _)| f.tests.rows_per_independent);
     let n = (fits[0].rows as f64 / best).max(10.0);
     // Below this the rows are explained to rounding and the criterion would weigh digits.
     let floor =
         1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
-    let criterion =
-        |f: &ModelFit| n * f.mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
+    // A row left out is an unknown of its own: Akaike's 2 for each, of which its square would have cost 1.
+    let criterion = |f: &ModelFit, a: &Alike| {
+        let explained = n * a.mse.max(floor).max(f64::MIN_POSITIVE).ln();
+        explained + f.unknowns as f64 * n.ln() + a.left_out as f64 / best
+    };
     let span_s = stretch.span_s();
-    let mut order: Vec<(bool, f64, ModelFit)> =
-        fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
+    let mut order: Vec<([bool; 2], f64, ModelFit)> = fits
+        .into_iter()
+        .zip(alike)
+        .map(|(f, a)| ([a.leaves_out, is_flawed(&f, span_s)], criterion(&f, &a), f))
+        .collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let enough = (0..order.len())
         .filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG)
@@ -117,6 +129,52 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
         fits[0] = with_drift_where_due(problem, &stretch, plain);
     }
     Ok(Choice { fits, criterion })
+}
+
+/// A fit on the rows that it has in common with the others.
+struct Alike {
+    /// Mean squared residual, in PV units squared.
+    mse: f64,
+    /// Rows that it leaves out and another explains.
+    left_out: usize,
+    /// Whether it explains far fewer rows than they do.
+    leaves_out: bool,
+}
+
+/// Each structure leaves out what its own dead time cannot explain at the start: compared are the rows that count in all.
+fn alike(fits: &[ModelFit], stretch: &Stretch) -> Vec<Alike> {
+    /// Part of the most rows of any that a fit has to explain.
+    const MOST: f64 = 0.8;
+    let most = fits.iter().map(|f| f.rows).max().unwrap_or(0);
+    let segments = stretch.segments.len();
+    let leaves_out = |f: &ModelFit| {
+        let dead_time_s = f.parameter("L_s").map_or(0.0, |l| l.value);
+        (f.rows as f64) < MOST * most as f64
+            || f.known_from.len() != segments
+            || stretch.is_out_of_reach(dead_time_s)
+    };
+    let leaves_out: Vec<bool> = fits.iter().map(leaves_out).collect();
+    let from: Vec<usize> = (0..segments)
+        .map(|s| {
+            let alike = fits.iter().zip(&leaves_out).filter(|(_, out)| !**out);
+            alike.map(|(f, _)| f.known_from[s]).max().unwrap_or(0)
+        })
+        .collect();
+    fits.iter()
+        .zip(&leaves_out)
+        .map(|(f, leaves_out)| {
+            if *leaves_out {
+                return Alike { mse: f.mse, left_out: 0, leaves_out: true };
+            }
+            let own = f.known_from.iter().zip(&from).flat_map(|(own, common)| *own..*common);
+            let (rows, squares) = own
+                .filter(|&k| stretch.is_kept(k))
+                .fold((0, 0.0), |(rows, sum), k| (rows + 1, sum + f.residuals[k].powi(2)));
+            let left = (f.rows - rows) as f64;
+            let mse = if rows == 0 { f.mse } else { (f.mse * f.rows as f64 - squares) / left };
+            Alike { mse, left_out: most - f.rows, leaves_out: false }
+        })
+        .collect()
 }
 
 /// Difference of Schwarz's criterion that is "very strong" evidence (Kass & Raftery, JASA 90 (1995) 773).

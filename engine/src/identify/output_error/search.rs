@@ -32,6 +32,8 @@ pub(in crate::identify) struct Near {
     pub first: Option<Point>,
     /// Of the same order.
     pub same: Option<Point>,
+    /// How far back those fits look, in seconds.
+    pub reach_s: Option<f64>,
 }
 
 /// The best point of a shape.
@@ -54,6 +56,17 @@ pub(in crate::identify) fn search(
     }
     work.thinned += count;
     let found = refine(stretch, shape, &best.points, PASSES, &mut work.passes)?;
+    Some(look_around(stretch, shape, found, work))
+}
+
+/// The best point next to one that was found on nearly the same rows.
+pub(in crate::identify) fn again(
+    stretch: &Stretch,
+    shape: &Shape,
+    points: &[Point],
+    work: &mut Work,
+) -> Option<Found> {
+    let found = refine(stretch, shape, points, PASSES, &mut work.passes)?;
     Some(look_around(stretch, shape, found, work))
 }
 

@@ -44,7 +44,8 @@ fn as_logged(problem: &FitProblem, structures: &[Structure]) -> Limited {
 
 fn within(problem: &FitProblem, [low, high]: [f64; 2], structures: &[Structure]) -> Limited {
     let mv: Vec<f64> = problem.mv.iter().map(|u| u.clamp(low, high)).collect();
-    let mut kept = FitProblem { mv: &mv, ..problem.clone() };
+    let history = problem.history.as_ref().map(|history| history.within([low, high]));
+    let mut kept = FitProblem { mv: &mv, history, ..problem.clone() };
     kept.options.mv_before = kept.options.mv_before.map(|u| u.clamp(low, high));
     let (choice, initial_state) = choose_from_rest(&kept, structures);
     Limited { mv: Some(mv), choice, initial_state }

@@ -170,7 +170,8 @@ fn answered_in_the_same_row(
     if !(at_once && no_dead_time) {
         return None;
     }
-    let shifted = FitProblem { mv: earlier, ..problem.clone() };
+    let history = problem.history.as_ref().map(|history| history.one_row_earlier(problem.mv[0]));
+    let shifted = FitProblem { mv: earlier, history, ..problem.clone() };
     let other = choose_among(&shifted, structures).ok()?;
     (other.chosen().mse < FALL * fit.mse && other.chosen().is_usable()).then_some(other)
 }
