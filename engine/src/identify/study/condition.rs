@@ -54,7 +54,7 @@ pub(super) fn condition(rows: &Rows) -> Conditioned {
             times: frozen.len(),
         });
     }
-    let spikes = spikes(pv, &keep);
+    let spikes = spikes(pv, mv, &keep);
     if let Some(&first) = spikes.first() {
         for &row in &spikes {
             keep[row] = false;

@@ -12,6 +12,7 @@ mod feedback;
 mod finding;
 mod limited;
 mod mode;
+mod pulses;
 mod spikes;
 mod stiction;
 mod valve;
@@ -29,7 +30,7 @@ use super::{
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
 use condition::{Rows, condition, mended, slips};
-use feedback::{controller_of, is_by_hand, refuse_feedback};
+use feedback::{controller_of, is_by_hand, refuse_feedback, reigns};
 use limited::Limited;
 
 /// What is asked of a study.
@@ -125,10 +126,10 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     problem.options.initial_state = initial_state;
     let mut controller = controller_of(&record, &problem, &saturated, &mut findings);
     if let Ok(choice) = &choice {
-        controller = controller.filter(|c| !is_by_hand(c, &problem, record.problem.mv, &choice.fits));
+        controller = controller.filter(|c| !is_by_hand(c, &record, &problem, &choice.fits));
     }
     if let Ok(choice) = &mut choice {
-        refuse_feedback(&record, &problem, controller.as_ref(), choice);
+        refuse_feedback(&record, &problem, controller.as_ref(), &saturated, choice);
     }
     let earlier = one_row_earlier(problem.mv);
     if !options.as_is
@@ -137,10 +138,11 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
         choice = Ok(better);
         findings.push(RecordFinding::MvEarlier);
     }
-    if let (Ok(choice), Some(controller)) = (&choice, &controller) {
+    let reigning = controller.as_ref().filter(|c| reigns(c, &saturated));
+    if let (Ok(choice), Some(controller)) = (&choice, reigning) {
         of_the_loop(controller, choice, &mut findings);
     }
-    let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
+    let oscillation = oscillation_of(&problem, reigning, choice.as_ref().ok(), &mut findings);
     let reaction_curve = reaction_curve(&problem);
     Ok(LoopStudy { choice, controller, oscillation, reaction_curve, findings })
 }
@@ -195,7 +197,12 @@ fn check_length(record: &LoopRecord) -> Result<(), FitError> {
 /// What model and controller say of each other.
 fn of_the_loop(controller: &ControllerFit, choice: &Choice, findings: &mut Vec<RecordFinding>) {
     let fit = choice.chosen();
-    if !fit.is_usable() || controller.r2 < 0.5 {
+    // A model that leaves a pattern of its own accuses nobody.
+    let is_in_doubt = fit.verdicts.iter().any(|verdict| {
+        use super::FitVerdict::{Poor, ResidualsFollowInput, Rings};
+        matches!(verdict, Poor { .. } | Rings { .. } | ResidualsFollowInput { .. })
+    });
+    if !fit.is_usable() || is_in_doubt || controller.r2 < 0.5 {
         return;
     }
     let gain = fit.parameters[0].value;
