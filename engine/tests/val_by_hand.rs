@@ -79,8 +79,8 @@ fn val_a_hand_that_moves_the_mv_smoothly_is_no_controller() {
                     assert!(found.findings.is_empty(), "{what}: {:?} {:?}", found.findings, found.controller);
                     let [low, high] = fit.parameters[0].interval_95;
                     let error = (fit.parameters[0].value / gain - 1.0).abs();
-                    // Without the MV ahead of the first row noise leaves more open.
-                    let held = told.is_none() && low <= gain && gain <= high;
+                    // Without the MV ahead of the first row noise leaves more open, of a ramp all.
+                    let held = told.is_none() && (!found.has_model() || low <= gain && gain <= high);
                     assert!(error < 0.01 + 0.3 * noise || held, "{what}: {:?}", fit.parameters);
                 }
             }

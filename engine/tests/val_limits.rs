@@ -274,3 +274,78 @@ fn limits_and_a_sticking_valve_are_found_beside_a_disturbance() {
         assert!(holds, "seed {seed}: {:?}", found.findings);
     }
 }
+
+/// A first order behind a curve of the MV, moved in steps of many levels.
+fn behind_a_curve(curve: &dyn Fn(f64) -> f64, seed: u64) -> Record {
+    let mut rng = StdRng::seed_from_u64(seed);
+    let mut out = Record { time_s: vec![], pv: vec![], mv: vec![], sp: vec![] };
+    let (mut y, mut u) = (0.0, 50.0);
+    let mut delayed = vec![50.0; 4];
+    for k in 0..2400 {
+        let (a, b): (f64, f64) = (StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng));
+        if k % 45 == 0 {
+            u = (50.0 + 18.0 * b).clamp(5.0, 95.0);
+        }
+        out.time_s.push(f64::from(k));
+        out.pv.push(y + 0.1 * a);
+        out.mv.push(u);
+        out.sp.push(0.0);
+        delayed.push(u);
+        y += 0.05 * (curve(delayed[delayed.len() - 4]) - y);
+    }
+    out
+}
+
+/// A gain that falls at some level of the MV was stated as a limit that the MV was logged ahead of.
+#[test]
+fn a_gain_that_changes_with_the_mv_is_no_limit() {
+    let knee = |to: f64| move |u: f64| if u < 50.0 { 2.0 * (u - 50.0) } else { 2.0 * to * (u - 50.0) };
+    let root = |u: f64| 20.0 * (u / 10.0).sqrt();
+    let curves: [(&str, Box<dyn Fn(f64) -> f64>); 5] = [
+        ("to a half", Box::new(knee(0.5))),
+        ("to a quarter", Box::new(knee(0.25))),
+        ("to a third", Box::new(knee(0.33))),
+        ("threefold", Box::new(knee(3.0))),
+        ("root", Box::new(root)),
+    ];
+    let mut said = 0;
+    for (name, curve) in &curves {
+        for seed in 1..=3 {
+            let found = study(&behind_a_curve(curve, seed), false);
+            assert_eq!(limits_of(&found), None, "{name}, seed {seed}: {:?}", found.findings);
+            let changes = |f: &RecordFinding| matches!(f, RecordFinding::GainChanges { .. });
+            said += usize::from(found.findings.iter().any(changes));
+        }
+    }
+    assert!(said >= 6, "said of {said} records of 15");
+    for seed in 1..=3 {
+        let found = study(&behind_a_curve(&|u| 2.0 * (u.min(55.0) - 50.0), seed), false);
+        let limits =
+            limits_of(&found).unwrap_or_else(|| panic!("no limits, seed {seed}: {:?}", found.findings));
+        assert!((limits[1] - 55.0).abs() < 1.0, "{limits:?}, seed {seed}");
+    }
+}
+
+/// A limit that the user gave was stated as found, and a limit on the other side was not looked for.
+#[test]
+fn a_limit_that_was_given_is_no_finding_and_the_other_side_is_looked_at() {
+    let truth = Tight::default();
+    let r = truth.run(1);
+    let problem = FitProblem::new(&r.time_s, &r.pv, &r.mv);
+    let record = LoopRecord { problem, sp: Some(&r.sp), mode: None };
+    for given in [truth.limits, [f64::NEG_INFINITY, truth.limits[1]]] {
+        let options = StudyOptions { mv_limits: Some(given), ..StudyOptions::default() };
+        let found = study_loop(&record, &options).expect("a study");
+        let told = found.findings.iter().any(|f| matches!(f, RecordFinding::MvLimitsGiven { .. }));
+        assert!(told, "{:?}", found.findings);
+        let seen = limits_of(&found);
+        if given == truth.limits {
+            assert_eq!(seen, None);
+        } else {
+            let [low, high] = seen.unwrap_or_else(|| panic!("{:?}", found.findings));
+            assert!((low - truth.limits[0]).abs() < 0.5 && high == truth.limits[1], "{low} {high}");
+        }
+        let gain = found.choice.as_ref().expect("a model").chosen().parameters[0].value;
+        assert!((gain / truth.gain - 1.0).abs() < 0.03, "K {gain}");
+    }
+}

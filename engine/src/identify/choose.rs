@@ -1,8 +1,8 @@
 //! Which structure a stretch speaks for.
 
-use super::fit_structure::{fit_on, with_drift_where_due};
+use super::fit_structure::{fit_on, shape_of, with_drift_where_due};
 use super::model_fit::ModelFit;
-use super::output_error::Near;
+use super::output_error::{Linear, Near, evaluate};
 use super::problem::{Drift, FitProblem, Stretch};
 use super::{FitError, FitVerdict, Structure};
 
@@ -82,36 +82,28 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     for &structure in structures {
         let point = |of: Structure| fits.iter().find(|f| f.structure == of).map(|f| f.coordinates.point());
         let same = (structure == Structure::SopdtZero).then(|| point(Structure::Sopdt)).flatten();
-        let reach_s = fits.iter().find(|f| f.structure == Structure::Fopdt).map(|f| f.reach_s);
-        let near = Near { first: point(Structure::Fopdt), same, reach_s };
+        let near = Near { first: point(Structure::Fopdt), same };
         match fit_on(problem, &stretch, structure, drift, &near) {
             Ok(fit) => fits.push(fit),
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
-    let alike = alike(&fits, &stretch);
-    let Some(least) = alike.iter().map(|a| a.mse).min_by(f64::total_cmp) else {
+    let squares = mean_squares(&fits, &stretch);
+    let Some((best, _)) = fits.iter().zip(&squares).min_by(|a, b| a.1.total_cmp(b.1)) else {
         return Err(first_error.unwrap_or(FitError::TooFewSamples { rows: stretch.len(), needed: 0 }));
     };
-    let best = fits
-        .iter()
-        .zip(&alike)
-        .find(|(_, a)| a.mse == least)
-        .map_or(1.0, |(f, _)| f.tests.rows_per_independent);
+    let best = best.tests.rows_per_independent;
     let n = (fits[0].rows as f64 / best).max(10.0);
     // Below this the rows are explained to rounding and the criterion would weigh digits.
     let floor =
         1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
-    // A row left out is an unknown of its own: Akaike's 2 for each, of which its square would have cost 1.
-    let criterion = |f: &ModelFit, a: &Alike| {
-        let explained = n * a.mse.max(floor).max(f64::MIN_POSITIVE).ln();
-        explained + f.unknowns as f64 * n.ln() + a.left_out as f64 / best
-    };
+    let criterion =
+        |f: &ModelFit, mse: f64| n * mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
     let span_s = stretch.span_s();
-    let mut order: Vec<([bool; 2], f64, ModelFit)> = fits
+    let mut order: Vec<(bool, f64, ModelFit)> = fits
         .into_iter()
-        .zip(alike)
-        .map(|(f, a)| ([a.leaves_out, is_flawed(&f, span_s)], criterion(&f, &a), f))
+        .zip(squares)
+        .map(|(f, mse)| (is_flawed(&f, span_s), criterion(&f, mse), f))
         .collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let enough = (0..order.len())
@@ -131,48 +123,25 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     Ok(Choice { fits, criterion })
 }
 
-/// A fit on the rows that it has in common with the others.
-struct Alike {
-    /// Mean squared residual, in PV units squared.
-    mse: f64,
-    /// Rows that it leaves out and another explains.
-    left_out: usize,
-    /// Whether it explains far fewer rows than they do.
-    leaves_out: bool,
-}
-
-/// Each structure leaves out what its own dead time cannot explain at the start: compared are the rows that count in all.
-fn alike(fits: &[ModelFit], stretch: &Stretch) -> Vec<Alike> {
-    /// Part of the most rows of any that a fit has to explain.
-    const MOST: f64 = 0.8;
-    let most = fits.iter().map(|f| f.rows).max().unwrap_or(0);
-    let segments = stretch.segments.len();
-    let leaves_out = |f: &ModelFit| {
-        let dead_time_s = f.parameter("L_s").map_or(0.0, |l| l.value);
-        (f.rows as f64) < MOST * most as f64
-            || f.known_from.len() != segments
-            || stretch.is_out_of_reach(dead_time_s)
-    };
-    let leaves_out: Vec<bool> = fits.iter().map(leaves_out).collect();
-    let from: Vec<usize> = (0..segments)
-        .map(|s| {
-            let alike = fits.iter().zip(&leaves_out).filter(|(_, out)| !**out);
-            alike.map(|(f, _)| f.known_from[s]).max().unwrap_or(0)
-        })
-        .collect();
+/// Mean squared residual of each fit on the same rows, in PV units squared.
+///
+/// Each leaves out what its own dead time cannot explain at the start; one that takes a slow beginning for a dead time would
+/// leave out what speaks against it. Compared are the rows that half of them explain.
+fn mean_squares(fits: &[ModelFit], stretch: &Stretch) -> Vec<f64> {
+    let mut reaches: Vec<f64> = fits.iter().map(|f| f.reach_s).collect();
+    reaches.sort_by(f64::total_cmp);
+    let typical = reaches.get(reaches.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
+    let Some(common) = stretch.known_after(typical) else { return fits.iter().map(|f| f.mse).collect() };
+    let rows = common.kept() as f64;
     fits.iter()
-        .zip(&leaves_out)
-        .map(|(f, leaves_out)| {
-            if *leaves_out {
-                return Alike { mse: f.mse, left_out: 0, leaves_out: true };
+        .map(|f| {
+            if f.known_from.iter().enumerate().all(|(s, from)| common.known(s).start == common.history + from)
+            {
+                return f.mse;
             }
-            let own = f.known_from.iter().zip(&from).flat_map(|(own, common)| *own..*common);
-            let (rows, squares) = own
-                .filter(|&k| stretch.is_kept(k))
-                .fold((0, 0.0), |(rows, sum), k| (rows + 1, sum + f.residuals[k].powi(2)));
-            let left = (f.rows - rows) as f64;
-            let mse = if rows == 0 { f.mse } else { (f.mse * f.rows as f64 - squares) / left };
-            Alike { mse, left_out: most - f.rows, leaves_out: false }
+            let shape = shape_of(&common, f.structure, f.drift.is_some()).without_derivatives();
+            let at = evaluate(&common, &shape, f.points(), &Linear::zero(&shape, &common));
+            at.map_or(f64::INFINITY, |at| at.rss() / rows)
         })
         .collect()
 }

@@ -91,11 +91,9 @@ pub(super) fn fit_on(
         let found = evaluate(&known, &shape, vec![point], &reference).ok_or_else(nothing)?;
         (known, found)
     } else {
-        let start = near.reach_s.and_then(|reach_s| stretch.known_after(reach_s));
-        let start = start.unwrap_or_else(|| stretch.clone());
-        let first = search(&start, &shape, near, &mut work).ok_or_else(nothing)?;
+        let first = search(stretch, &shape, near, &mut work).ok_or_else(nothing)?;
         let refit = |known: &Stretch, from: &Found| again(known, &shape, &from.points, &mut work);
-        settled(stretch, start, first, |found| reaches_s(stretch, &shape, found), refit)
+        settled(stretch, stretch.clone(), first, |found| reaches_s(stretch, &shape, found), refit)
     };
     let mut fit = report(problem, &known, structure, &shape, &found).ok_or_else(nothing)?;
     profile_dead_times(&known, &shape, &found, by_short_cut, &mut fit, &mut work);
@@ -105,7 +103,13 @@ pub(super) fn fit_on(
 }
 
 /// How far back a fit looks, with and without room for doubt about its dead times: the farthest of its channels.
+///
+/// A disturbance that stands still from the first row on for as long as its dead time is taken to have stood still ahead of
+/// it as well, and one of a long dead time to have been where it starts: the rows it would cost tell more of the MV than its
+/// unknown past spoils.
 pub(super) fn reaches_s(stretch: &Stretch, shape: &Shape, found: &Found) -> [f64; 2] {
+    /// Part of the stretch beyond which the dead time of a disturbance costs too many rows.
+    const LONG: f64 = 0.1;
     let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
     let covariance = found.projected.matrix.inverse();
     found.points.iter().enumerate().fold([0.0_f64; 2], |farthest, (channel, point)| {
@@ -113,6 +117,10 @@ pub(super) fn reaches_s(stretch: &Stretch, shape: &Shape, found: &Found) -> [f64
         let error =
             covariance.as_ref().map_or(f64::INFINITY, |c| (found.rss() / spare * c.at(at, at)).sqrt());
         let own = reach_s(point.dead_time_s, error * point.time_s);
+        let rests = stretch.rests_s(channel) > point.dead_time_s;
+        if channel > 0 && (rests || own[0] > LONG * stretch.span_s()) {
+            return farthest;
+        }
         [farthest[0].max(own[0]), farthest[1].max(own[1])]
     })
 }

@@ -28,7 +28,7 @@ pub struct History<'a> {
     pub disturbances: Vec<Cow<'a, [f64]>>,
 }
 
-impl History<'_> {
+impl<'a> History<'a> {
     /// The same columns, borrowed.
     #[must_use]
     pub fn borrowed(&self) -> History<'_> {
@@ -95,14 +95,16 @@ impl<'a> Stretch<'a> {
         !self.at_rest || self.segments.len() > 1
     }
 
+    /// How long an input stands still from the first row on, in seconds.
+    pub fn rests_s(&self, input: usize) -> f64 {
+        let values = self.input(input).values;
+        let moved = values.iter().position(|v| *v != values[0]).unwrap_or(values.len() - 1);
+        self.t[moved] - self.t[0]
+    }
+
     /// Whether every row answers an MV that is known.
     fn is_all_known(&self) -> bool {
         self.segments.len() == 1 && (self.at_rest || self.mv_before_told)
-    }
-
-    /// Whether a dead time leaves too few rows that answer an MV that is known.
-    pub fn is_out_of_reach(&self, dead_time_s: f64) -> bool {
-        !self.is_all_known() && self.known_after(dead_time_s).is_none()
     }
 
     /// The stretch without the rows within `reach_s` of the start of a segment whose past is not known, behind as much

@@ -32,8 +32,6 @@ pub(in crate::identify) struct Near {
     pub first: Option<Point>,
     /// Of the same order.
     pub same: Option<Point>,
-    /// How far back those fits look, in seconds.
-    pub reach_s: Option<f64>,
 }
 
 /// The best point of a shape.

@@ -11,7 +11,7 @@ use super::clip_fit::{LimitsFit, clipped, descend, without_idle};
 use super::valve::{Valve, holding_cost};
 use crate::identify::fit_structure::{free_run, shape_of};
 use crate::identify::output_error::{Linear, Near, Point, Shape, Work, evaluate, refine, search};
-use crate::identify::problem::Stretch;
+use crate::identify::problem::{Other, Stretch};
 use crate::identify::statistics::mean;
 use crate::identify::{FitProblem, Structure};
 
@@ -48,6 +48,13 @@ pub(super) enum Seen {
     Nothing,
     /// Limits behind the log.
     Limits(Limits),
+    /// No limits: beyond these levels of the MV the gain is another.
+    GainChanges {
+        /// In MV units.
+        limits: [f64; 2],
+        /// The gain beyond them, in percent of that between.
+        percent: f64,
+    },
     /// A valve that moves only once it was asked for that much, in MV units.
     Holds(f64),
 }
@@ -123,9 +130,34 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     // A limit beyond which next to nothing lies is none.
     let beyond = problem.mv.iter().filter(|u| !(best.limits[0]..=best.limits[1]).contains(*u)).count();
     (best.rss < without[0].min(without[1]) && 100 * beyond > problem.mv.len()).then(|| {
+        if let Some(percent) = gain_beyond(&stretch, &best, &shape) {
+            return Seen::GainChanges { limits: best.limits, percent };
+        }
         let others = found[1..].iter().map(|f| (f.limits, f.rss / best.rss)).collect();
         Seen::Limits(Limits { best: best.limits, others })
     })
+}
+
+/// The gain beyond limits in percent of that between them, where it is not next to nothing as behind a real limit.
+///
+/// What lies beyond goes in as an input of its own with the process's dynamics: a limit leaves it no gain.
+fn gain_beyond(stretch: &Stretch, at: &LimitsFit, shape: &Shape) -> Option<f64> {
+    /// Percent up to which limits that are a little off explain it.
+    const NOTHING: f64 = 12.0;
+    /// The squared residual must fall to this part.
+    const FALL: f64 = 0.9;
+    let mut within = clipped(stretch, at.limits, 1);
+    let past =
+        |u: &[f64]| -> Vec<f64> { u.iter().map(|u| u - u.clamp(at.limits[0], at.limits[1])).collect() };
+    within.others.push(Other::new(past(&stretch.u).into()));
+    let channels = [shape.channels.clone(), vec![shape.channels[0]]].concat();
+    let wide = Shape::new(channels, shape.drift, shape.free);
+    let mut points = at.found.points.clone();
+    points.push(points[0]);
+    let found = evaluate(&within, &wide, points, &Linear::zero(&wide, &within))?;
+    let gain = |channel: usize| found.projected.linear.shared[wide.gains[channel]];
+    let percent = 100.0 * gain(wide.gains.len() - 1) / gain(0);
+    (found.rss() < FALL * at.rss && percent.abs() > NOTHING).then_some(percent)
 }
 
 /// A copy without what disturbances do to the PV with a process that has no limits, and the dynamics of each.

@@ -10,6 +10,7 @@ mod condition;
 mod controller;
 mod feedback;
 mod finding;
+mod interpolated;
 mod limited;
 mod mode;
 mod pulses;
@@ -227,7 +228,9 @@ fn oscillation_of(
 ) -> Option<Oscillation> {
     // An open loop swings with what a hand does: no sign of the valve.
     controller.filter(|c| c.r2 > 0.3)?;
-    let integrating = choice.is_some_and(|c| matches!(c.chosen().model, ProcessModel::Ipdt(_)));
+    // What was refused tells no structure either.
+    let fit = choice.map(Choice::chosen).filter(|fit| fit.is_usable());
+    let integrating = fit.is_some_and(|fit| matches!(fit.model, ProcessModel::Ipdt(_)));
     let found = stiction::oscillation(problem.time_s, problem.pv, problem.mv, integrating)?;
     if found.sticks() {
         findings.push(RecordFinding::Stiction {
