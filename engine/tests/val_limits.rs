@@ -58,7 +58,7 @@ impl Tight {
         let mut out = Record { time_s: vec![], pv: vec![], mv: vec![], sp: vec![] };
         let (mut y, mut integral, mut answer) = (0.0, 0.0, 0.0);
         let mut valve = vec![40.0; self.dead_time_s + 1];
-        for k in 0..self.rows {
+        for (k, load) in load.iter().enumerate() {
             let normal: f64 = StandardNormal.sample(&mut rng);
             let pv = y + answer + self.noise * normal;
             let sp = if (k / self.square.1) % 2 == 1 { self.square.0 } else { 0.0 };
@@ -72,7 +72,7 @@ impl Tight {
             valve.push(got);
             let delayed = valve[valve.len() - 1 - self.dead_time_s];
             y = a * y + (1.0 - a) * self.gain * (delayed - 40.0);
-            answer += -f64::exp_m1(-1.0 / 25.0) * (1.5 * load[k] - answer);
+            answer += -f64::exp_m1(-1.0 / 25.0) * (1.5 * load - answer);
             out.time_s.push(k as f64);
             out.pv.push(pv);
             out.mv.push(wish);
@@ -296,12 +296,14 @@ fn behind_a_curve(curve: &dyn Fn(f64) -> f64, seed: u64) -> Record {
     out
 }
 
+type Curve = (&'static str, Box<dyn Fn(f64) -> f64>);
+
 /// A gain that falls at some level of the MV was stated as a limit that the MV was logged ahead of.
 #[test]
 fn a_gain_that_changes_with_the_mv_is_no_limit() {
     let knee = |to: f64| move |u: f64| if u < 50.0 { 2.0 * (u - 50.0) } else { 2.0 * to * (u - 50.0) };
     let root = |u: f64| 20.0 * (u / 10.0).sqrt();
-    let curves: [(&str, Box<dyn Fn(f64) -> f64>); 5] = [
+    let curves: [Curve; 5] = [
         ("to a half", Box::new(knee(0.5))),
         ("to a quarter", Box::new(knee(0.25))),
         ("to a third", Box::new(knee(0.33))),

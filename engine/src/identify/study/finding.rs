@@ -164,31 +164,10 @@ impl std::fmt::Display for RecordFinding {
                 "the MV is at its limit {} for {rows} rows: there the controller does not act",
                 n(*limit)
             ),
-            Self::MvBeyondLimits { limits, rows } => write!(
-                f,
-                "the PV follows the MV only between {} and {}, as where the MV is logged ahead of its limits: {rows} rows lie beyond and were taken at the limit",
-                n(limits[0]),
-                n(limits[1])
-            ),
-            Self::MvLimitsGiven { limits, rows } => write!(
-                f,
-                "{rows} rows of the MV lie beyond the limits given and were taken at them: it is between {} and {}",
-                n(limits[0]),
-                n(limits[1])
-            ),
-            Self::GainChanges { limits, percent } => write!(
-                f,
-                "the gain changes with the MV: below {} and above {} it is about {} % of that between; one linear model holds for neither, fit a stretch on one side",
-                n(limits[0]),
-                n(limits[1]),
-                n(*percent)
-            ),
-            Self::MvLimitsUnknown { limits } => write!(
-                f,
-                "the limits of the MV ({} and {}) cannot be told from this stretch, and T and L depend on them: give them with --mv-min and --mv-max",
-                n(limits[0]),
-                n(limits[1])
-            ),
+            Self::MvBeyondLimits { .. }
+            | Self::MvLimitsGiven { .. }
+            | Self::GainChanges { .. }
+            | Self::MvLimitsUnknown { .. } => self.write_limits(f),
             Self::ValveHolds { band } => write!(
                 f,
                 "the PV follows the MV as behind a valve that moves only once it was asked for about {}: it sticks or has play, and the model holds for larger moves only",
@@ -290,6 +269,39 @@ impl Explain for RecordFinding {
 }
 
 impl RecordFinding {
+    /// What is said of limits of the MV; nothing for the others.
+    fn write_limits(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::MvBeyondLimits { limits, rows } => write!(
+                f,
+                "the PV follows the MV only between {} and {}, as where the MV is logged ahead of its limits: {rows} rows lie beyond and were taken at the limit",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            Self::MvLimitsGiven { limits, rows } => write!(
+                f,
+                "{rows} rows of the MV lie beyond the limits given and were taken at them: it is between {} and {}",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            Self::GainChanges { limits, percent } => write!(
+                f,
+                "the gain changes with the MV: below {} and above {} it is about {} % of that between; one linear model holds for neither, fit a stretch on one side",
+                n(limits[0]),
+                n(limits[1]),
+                n(*percent)
+            ),
+            Self::MvLimitsUnknown { limits } => write!(
+                f,
+                "the limits of the MV ({} and {}) cannot be told from this stretch, and T and L depend on them: give them with --mv-min and --mv-max",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether an engineer should act on it.
     #[must_use]
     pub fn is_warning(&self) -> bool {
