@@ -133,12 +133,3 @@ fn a_scenario_says_how_its_tests_ended() {
         (&"step".into(), &false.into(), &5.0.into())
     );
 }
-
-/// A test whose record told no model ended with 0.
-#[test]
-fn a_test_that_tells_no_model_is_a_no() {
-    let (whole, status) = json(&["--doublet", "0.001", "--hold", "5"]);
-    assert_eq!(whole["finished"], Value::Bool(true), "{}", whole["ended"]);
-    assert!(whole["model"].is_null(), "{}", whole["model"]);
-    assert_eq!(status, 1);
-}
