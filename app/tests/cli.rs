@@ -384,3 +384,35 @@ fn values_beyond_all_scales_are_refused() {
         assert!(status == 2 && said.contains("choose a unit") && !said.contains('∞'), "{status}: {said}");
     }
 }
+
+/// Rows ahead of `--from` were not looked at: the first L seconds of the stretch answer their MV.
+#[test]
+fn the_rows_ahead_of_a_stretch_tell_its_mv() {
+    let mv = |k: i32| if k < 190 { 0.0 } else { f64::from(k % 100 / 40) + 1.0 };
+    let (mut y, a) = (0.0, (-1.0_f64 / 30.0).exp());
+    let mut text = "time,pv,mv\n".to_owned();
+    for k in 0..700 {
+        text.push_str(&format!("{k},{y},{}\n", mv(k)));
+        y = a * y + (1.0 - a) * 2.0 * mv(k - 20);
+    }
+    let log = log_file("ahead.csv", &text);
+    let (whole, status) = json(&[
+        "identify",
+        &log,
+        "--pv",
+        "pv",
+        "--mv",
+        "mv",
+        "--from",
+        "200",
+        "--structure",
+        "fopdt",
+        "--json",
+    ]);
+    let model = &whole["models"][0];
+    assert_eq!((status, &model["rows"]), (0, &Value::from(500)), "every row of the stretch counts");
+    for (key, value) in [("K", 2.0), ("T_s", 30.0), ("L_s", 20.0)] {
+        let found = model[key].as_f64().expect("a number");
+        assert!((found - value).abs() < 1e-3, "{key} = {found}");
+    }
+}

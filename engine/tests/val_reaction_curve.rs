@@ -119,7 +119,10 @@ fn val_noise_is_smoothed() {
             assert!(dt < most_t && dl < most_l, "{what}");
             assert!(e.r2 > 0.97, "{what}: {}", e.r2);
         }
-        let fit = fit_model(&FitProblem::new(&r.0, &r.1, &r.2), Structure::Fopdt).expect("a fit");
+        // The rest ahead of a step tells the MV before the first row.
+        let mut problem = FitProblem::new(&r.0, &r.1, &r.2);
+        problem.options.mv_before = Some(r.2[0]);
+        let fit = fit_model(&problem, Structure::Fopdt).expect("a fit");
         let ProcessModel::Fopdt(model) = fit.model else { panic!("a first order") };
         assert_eq!(found.estimate(CurveMethod::LeastSquares).expect("an estimate").model, model);
     }

@@ -6,10 +6,10 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, ModelFit, Structure, choose_model, fit_model,
+    Disturbance, Drift, FitOptions, FitProblem, FitVerdict, ModelFit, Structure, choose_model, fit_model,
 };
 
-use records::{Truth, moves};
+use records::{Truth, moves, noise};
 
 fn assert_found(truth: &Truth, fit: &ModelFit, tolerance: f64, what: &str) {
     for (name, value, size) in truth.expected() {
@@ -263,4 +263,37 @@ fn val_a_first_order_in_noise_is_not_given_a_pole_and_a_zero_that_cancel() {
             assert_eq!(fit.structure, Structure::Fopdt, "K {gain}, seed {seed}: {:?}", fit.parameters);
         }
     }
+}
+
+/// A PV that swings by itself beside an MV that moves now and then: a model that rings explains it, and says so.
+#[test]
+fn a_ring_that_the_mv_need_not_have_made_is_said() {
+    let time_s: Vec<f64> = (0..900).map(f64::from).collect();
+    let mv = moves(&time_s, &[(100.0, 1.0), (400.0, 0.0), (650.0, 1.5)], 0.0);
+    let clean = Truth::Second { k: 2.0, tau: 12.0, zeta: 0.08, tz: 0.0, l: 3.0 }.run(&time_s, &mv, 0.0);
+    let mut rng = StdRng::seed_from_u64(4);
+    let e = noise(&mut rng, time_s.len(), 0.95);
+    let pv: Vec<f64> = clean.iter().zip(&e).map(|(y, e)| y + 0.5 * e).collect();
+    let fit = fit_model(&FitProblem::new(&time_s, &pv, &mv), Structure::Sopdt).expect("a fit");
+    let rings = fit.verdicts.iter().find_map(|v| match v {
+        FitVerdict::Rings { period_s, zeta } => Some((*period_s, *zeta)),
+        _ => None,
+    });
+    let (period_s, zeta) = rings.unwrap_or_else(|| panic!("{:?}", fit.verdicts));
+    assert!((period_s / (std::f64::consts::TAU * 12.0) - 1.0).abs() < 0.1 && zeta < 0.3, "{period_s} {zeta}");
+}
+
+/// A second time constant that a first order leaves nothing to tell of is unknown, not zero.
+#[test]
+fn a_parameter_of_which_nothing_is_known_is_said() {
+    let time_s: Vec<f64> = (0..300).map(f64::from).collect();
+    let mv: Vec<f64> = time_s.iter().map(|t| t / 30.0).collect();
+    let pv: Vec<f64> = time_s.iter().map(|t| t / 15.0 + 3.0).collect();
+    let mut said = 0;
+    for structure in [Structure::Fopdt, Structure::Sopdt, Structure::SopdtZero] {
+        let fit = fit_model(&FitProblem::new(&time_s, &pv, &mv), structure).expect("a fit");
+        let unknown = |v: &&FitVerdict| matches!(v, FitVerdict::ParameterUnknown { .. });
+        said += fit.verdicts.iter().filter(unknown).count();
+    }
+    assert!(said > 0);
 }

@@ -165,7 +165,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
         write_run(&run, path).map_err(Refusal::of)?;
     }
     let told = report.moved_at_s.map(|_| identify_report(&report));
-    let status = u8::from(report.ending != Ending::Finished);
+    let has_model = |told: &Result<Identified, _>| told.as_ref().is_ok_and(|told| told.has_model);
+    let status = u8::from(report.ending != Ending::Finished || !told.as_ref().is_some_and(has_model));
     let text = if arguments.json {
         json::text(&as_json(arguments, &report, told.as_ref()))
     } else {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, ModeColumn, Structure, StudyOptions,
+    Disturbance, Drift, FitOptions, FitProblem, History, LoopRecord, ModeColumn, Structure, StudyOptions,
 };
 use vasos_engine::signal::{CompleteRows, LogTable, derived_column};
 use vasos_io::log::ImportedLog;
@@ -145,6 +145,7 @@ impl LoadedLog {
         let others = self.columns.disturbances.iter().zip(&rows.columns[2..]);
         problem.disturbances =
             others.map(|(name, values)| Disturbance { name: name.clone(), values }).collect();
+        problem.history = self.stretch.history();
         LoopRecord { problem, sp: self.stretch.sp.as_deref(), mode: self.stretch.mode() }
     }
 
@@ -183,6 +184,8 @@ fn names(table: &LogTable) -> String {
 pub(super) struct Stretch {
     /// PV, MV and the disturbances.
     pub rows: CompleteRows,
+    /// MV and disturbances ahead of them.
+    ahead: CompleteRows,
     pub sp: Option<Vec<f64>>,
     mode: Option<Vec<f64>>,
     /// Words of the mode, where its column holds words.
@@ -204,6 +207,7 @@ impl Stretch {
         }
         let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let rows = table.complete(&slices, from_s, to_s);
+        let start_s = rows.time_s.first().copied().unwrap_or(from_s);
         // A setpoint or mode that is missing here and there holds its last value.
         let held = |name: &Option<String>| -> Result<Option<Vec<f64>>, Refusal> {
             let Some(name) = name else { return Ok(None) };
@@ -215,7 +219,17 @@ impl Stretch {
             mode: held(&chosen.mode)?,
             mode_words: chosen.mode.as_ref().and_then(words).unwrap_or_default(),
             first_row: rows.first_line(table),
+            ahead: table.ahead(&slices[1..], start_s),
             rows,
+        })
+    }
+
+    fn history(&self) -> Option<History<'_>> {
+        let (mv, disturbances) = self.ahead.columns.split_first()?;
+        Some(History {
+            time_s: self.ahead.time_s.as_slice().into(),
+            mv: mv.as_slice().into(),
+            disturbances: disturbances.iter().map(|values| values.as_slice().into()).collect(),
         })
     }
 

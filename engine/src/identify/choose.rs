@@ -1,9 +1,9 @@
 //! Which structure a stretch speaks for.
 
-use super::fit_structure::{fit_on, with_drift_where_due};
+use super::fit_structure::{fit_on, shape_of, with_drift_where_due};
 use super::model_fit::ModelFit;
-use super::output_error::Near;
-use super::problem::{Drift, FitProblem};
+use super::output_error::{Linear, Near, evaluate};
+use super::problem::{Drift, FitProblem, Stretch};
 use super::{FitError, FitVerdict, Structure};
 
 /// Several structures on one stretch, best first.
@@ -88,19 +88,23 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
-    let Some(least) = fits.iter().map(|f| f.mse).min_by(f64::total_cmp) else {
+    let squares = mean_squares(&fits, &stretch);
+    let Some((best, _)) = fits.iter().zip(&squares).min_by(|a, b| a.1.total_cmp(b.1)) else {
         return Err(first_error.unwrap_or(FitError::TooFewSamples { rows: stretch.len(), needed: 0 }));
     };
-    let best = fits.iter().find(|f| f.mse == least).map_or(1.0, |f| f.tests.rows_per_independent);
+    let best = best.tests.rows_per_independent;
     let n = (fits[0].rows as f64 / best).max(10.0);
     // Below this the rows are explained to rounding and the criterion would weigh digits.
     let floor =
         1e-18 * stretch.y.iter().map(|y| (y - stretch.y_ref).powi(2)).sum::<f64>() / stretch.len() as f64;
     let criterion =
-        |f: &ModelFit| n * f.mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
+        |f: &ModelFit, mse: f64| n * mse.max(floor).max(f64::MIN_POSITIVE).ln() + f.unknowns as f64 * n.ln();
     let span_s = stretch.span_s();
-    let mut order: Vec<(bool, f64, ModelFit)> =
-        fits.into_iter().map(|f| (is_flawed(&f, span_s), criterion(&f), f)).collect();
+    let mut order: Vec<(bool, f64, ModelFit)> = fits
+        .into_iter()
+        .zip(squares)
+        .map(|(f, mse)| (is_flawed(&f, span_s), criterion(&f, mse), f))
+        .collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let enough = (0..order.len())
         .filter(|&i| order[i].0 == order[0].0 && order[i].1 < order[0].1 + VERY_STRONG)
@@ -117,6 +121,29 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
         fits[0] = with_drift_where_due(problem, &stretch, plain);
     }
     Ok(Choice { fits, criterion })
+}
+
+/// Mean squared residual of each fit on the same rows, in PV units squared.
+///
+/// Each leaves out what its own dead time cannot explain at the start; one that takes a slow beginning for a dead time would
+/// leave out what speaks against it. Compared are the rows that half of them explain.
+fn mean_squares(fits: &[ModelFit], stretch: &Stretch) -> Vec<f64> {
+    let mut reaches: Vec<f64> = fits.iter().map(|f| f.reach_s).collect();
+    reaches.sort_by(f64::total_cmp);
+    let typical = reaches.get(reaches.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
+    let Some(common) = stretch.known_after(typical) else { return fits.iter().map(|f| f.mse).collect() };
+    let rows = common.kept() as f64;
+    fits.iter()
+        .map(|f| {
+            if f.known_from.iter().enumerate().all(|(s, from)| common.known(s).start == common.history + from)
+            {
+                return f.mse;
+            }
+            let shape = shape_of(&common, f.structure, f.drift.is_some()).without_derivatives();
+            let at = evaluate(&common, &shape, f.points(), &Linear::zero(&shape, &common));
+            at.map_or(f64::INFINITY, |at| at.rss() / rows)
+        })
+        .collect()
 }
 
 /// Difference of Schwarz's criterion that is "very strong" evidence (Kass & Raftery, JASA 90 (1995) 773).

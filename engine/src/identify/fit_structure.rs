@@ -1,22 +1,24 @@
 //! Fits one structure by output error and reports on it.
 
-use super::fopdt::Interval;
+use super::fopdt::{Interval, fit_with_stretch};
 use super::judge;
+use super::known::{reach_s, settled};
 use super::model_fit::{DisturbanceFit, ModelFit};
 use super::output_error::{
-    Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, blocks, dead_time_interval, evaluate,
-    is_wide, search,
+    Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, again, blocks, dead_time_interval,
+    evaluate, is_wide, search,
 };
 use super::parameters::{Coordinates, Parameter};
 use super::problem::{Drift, FitProblem, Stretch};
 use super::residual_tests::ResidualTests;
 use super::statistics::student_95;
-use super::{FitError, Structure, fit_fopdt};
+use super::{FitError, Structure};
 
 /// Fits one structure to a stretch by output error.
 ///
 /// y(t) = bias + drift t + G u + Σ Gj dj + free state: exact for inputs held between arbitrary stamps, dead times
-/// continuous, a free state for each segment. Drift is fitted where `options.drift` asks for it; an integrating model
+/// continuous, a free state for each segment; rows within L of a segment's start answer an MV that is not known, and don't
+/// count. Drift is fitted where `options.drift` asks for it; an integrating model
 /// always has it, as the MV at which its PV stands still. Measured disturbances are first order, or integrating with
 /// the main model. Intervals are Student's; where the residuals are not white, the covariance is multiplied by the
 /// number of rows that say as much as one independent row.
@@ -77,25 +79,50 @@ pub(super) fn fit_on(
     let plain =
         structure == Structure::Fopdt && !drift && stretch.keep.is_none() && problem.disturbances.is_empty();
     let mut by_short_cut = None;
-    let found = if plain {
-        let fit = fit_fopdt(problem)?;
+    let (known, found) = if plain {
+        let (known, fit) = fit_with_stretch(problem)?;
         work = Work { passes: fit.passes + 1, thinned: fit.thinned_passes };
         by_short_cut = Some(fit.interval_95.dead_time_s);
         let point =
             Point { time_s: fit.model.time_constant_s, zeta: 1.0, dead_time_s: fit.model.dead_time_s };
         // Residuals against the short cut's answer keep the digits that the inner products would square away.
-        let mut reference = Linear::zero(&shape, stretch);
-        reference.shared = vec![fit.bias + fit.model.gain * stretch.u_ref - stretch.y_ref, fit.model.gain];
-        evaluate(stretch, &shape, vec![point], &reference)
+        let mut reference = Linear::zero(&shape, &known);
+        reference.shared = vec![fit.bias + fit.model.gain * known.u_ref - known.y_ref, fit.model.gain];
+        let found = evaluate(&known, &shape, vec![point], &reference).ok_or_else(nothing)?;
+        (known, found)
     } else {
-        search(stretch, &shape, near, &mut work)
+        let first = search(stretch, &shape, near, &mut work).ok_or_else(nothing)?;
+        let refit = |known: &Stretch, from: &Found| again(known, &shape, &from.points, &mut work);
+        settled(stretch, stretch.clone(), first, |found| reaches_s(stretch, &shape, found), refit)
     };
-    let found = found.ok_or_else(nothing)?;
-    let mut fit = report(problem, stretch, structure, &shape, &found).ok_or_else(nothing)?;
-    profile_dead_times(stretch, &shape, &found, by_short_cut, &mut fit, &mut work);
+    let mut fit = report(problem, &known, structure, &shape, &found).ok_or_else(nothing)?;
+    profile_dead_times(&known, &shape, &found, by_short_cut, &mut fit, &mut work);
     (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
-    fit.verdicts = judge::of_model(&fit, stretch, problem);
+    fit.verdicts = judge::of_model(&fit, &known, problem);
     Ok(fit)
+}
+
+/// How far back a fit looks, with and without room for doubt about its dead times: the farthest of its channels.
+///
+/// A disturbance that stands still from the first row on for as long as its dead time is taken to have stood still ahead of
+/// it as well, and one of a long dead time to have been where it starts: the rows it would cost tell more of the MV than its
+/// unknown past spoils.
+pub(super) fn reaches_s(stretch: &Stretch, shape: &Shape, found: &Found) -> [f64; 2] {
+    /// Part of the stretch beyond which the dead time of a disturbance costs too many rows.
+    const LONG: f64 = 0.1;
+    let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
+    let covariance = found.projected.matrix.inverse();
+    found.points.iter().enumerate().fold([0.0_f64; 2], |farthest, (channel, point)| {
+        let at = shape.shared.len() + shape.first_unknown(channel) + shape.channels[channel].unknowns() - 1;
+        let error =
+            covariance.as_ref().map_or(f64::INFINITY, |c| (found.rss() / spare * c.at(at, at)).sqrt());
+        let own = reach_s(point.dead_time_s, error * point.time_s);
+        let rests = stretch.rests_s(channel) > point.dead_time_s;
+        if channel > 0 && (rests || own[0] > LONG * stretch.span_s()) {
+            return farthest;
+        }
+        [farthest[0].max(own[0]), farthest[1].max(own[1])]
+    })
 }
 
 /// Intervals of the dead times by likelihood ratio, where the curvature would not do; `by_short_cut` is that of the
@@ -132,7 +159,7 @@ pub(super) fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> 
     };
     let mut channels = vec![main];
     channels.extend(stretch.others.iter().map(|_| other));
-    Shape::new(channels, drift, stretch.free)
+    Shape::new(channels, drift, stretch.has_free())
 }
 
 fn report(
@@ -143,19 +170,15 @@ fn report(
     found: &Found,
 ) -> Option<ModelFit> {
     let linear = &found.projected.linear;
-    let (simulated, residuals) = free_run(stretch, shape, found);
+    let (simulated, mut residuals) = free_run(stretch, shape, found);
+    let simulated = stretch.filled_back(simulated);
+    residuals.drain(..stretch.history);
     let rows = stretch.kept();
     let rss: f64 = residuals.iter().map(|r| r * r).sum();
-    let movement: f64 = stretch
-        .y
-        .iter()
-        .enumerate()
-        .filter(|(k, _)| stretch.counts(*k))
-        .map(|(_, y)| (y - stretch.y_ref).powi(2))
-        .sum();
+    let movement: f64 = stretch.kept_rows().map(|k| (stretch.y[k] - stretch.y_ref).powi(2)).sum();
     let unknowns = shape.parameters(stretch);
     let freedom = rows.saturating_sub(unknowns).max(1);
-    let tests = ResidualTests::new(&residuals, &stretch.u);
+    let tests = ResidualTests::new(&residuals, &stretch.u[stretch.history..]);
     let student = student_95(freedom);
     let variance = rss / freedom as f64 * tests.rows_per_independent;
     let whole = found.projected.matrix.inverse();
@@ -210,6 +233,8 @@ fn report(
         thinned_passes: 0,
         student,
         coordinates: main,
+        reach_s: reaches_s(stretch, shape, found)[0],
+        known_from: (0..stretch.segments.len()).map(|s| stretch.known(s).start - stretch.history).collect(),
     })
 }
 
@@ -256,10 +281,10 @@ fn taken(whole: Option<&Symmetric>, places: &[usize], variance: f64) -> Symmetri
     out
 }
 
-/// Free run ŷ on every row, and the residuals of those that count.
+/// Free run ŷ on every known row, and the residuals of those that count; NaN and 0 on the others.
 pub(super) fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<f64>, Vec<f64>) {
-    let mut simulated = Vec::with_capacity(stretch.len());
-    let mut residuals = Vec::with_capacity(stretch.len());
+    let mut simulated = vec![f64::NAN; stretch.len()];
+    let mut residuals = vec![0.0; stretch.len()];
     let whole = Stretch { keep: None, ..stretch.clone() };
     blocks(
         &whole,
@@ -268,8 +293,8 @@ pub(super) fn free_run(stretch: &Stretch, shape: &Shape, found: &Found) -> (Vec<
         &found.projected.linear,
         |_, first, columns| {
             for (i, r) in columns.values[shape.residual][..columns.rows].iter().enumerate() {
-                simulated.push(stretch.y[first + i] - r);
-                residuals.push(if stretch.counts(first + i) { *r } else { 0.0 });
+                simulated[first + i] = stretch.y[first + i] - r;
+                residuals[first + i] = if stretch.is_kept(first + i) { *r } else { 0.0 };
             }
         },
     );

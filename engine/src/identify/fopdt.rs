@@ -2,6 +2,7 @@
 
 use super::FitError;
 use super::gram::Linear;
+use super::known::{reach_s, settled};
 use super::optimise::{Bounds, Point, evaluate, no_reference, refine};
 use super::problem::{FitProblem, Stretch};
 use super::profile::dead_time_interval;
@@ -57,11 +58,11 @@ pub struct FopdtFit {
     pub mse: f64,
     /// Akaike's criterion, N ln(RSS/N) + 2 p with p unknowns.
     pub aic: f64,
-    /// Rows fitted.
+    /// Rows fitted: all, but for those that answer an MV from before the first row or from a gap.
     pub rows: usize,
     /// Pieces between gaps.
     pub segments: usize,
-    /// Free run ŷ, one value a row, in PV units.
+    /// Free run ŷ, one value a row, in PV units; ahead of the first row fitted, the value there.
     pub simulated: Vec<f64>,
     /// Passes over all rows.
     pub passes: usize,
@@ -81,13 +82,19 @@ impl FopdtFit {
 ///
 /// y(t) = bias + K x(t) + free state, T ẋ = −x + u(t − L): exact for an MV held between arbitrary stamps, L ≥ 0
 /// continuous. Minimises ‖y − ŷ‖² over K, T, L, bias and the initial state of each segment: a global start over
-/// (T, L), then Gauss–Newton with the linear unknowns projected out.
+/// (T, L), then Gauss–Newton with the linear unknowns projected out. With a free start the rows within L of the start of a
+/// segment answer an MV that is not known, and don't count.
 ///
 /// # Errors
 /// [`FitError`] names the column and the row of what is wrong with the data.
 ///
 /// Source: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; Ljung, System Identification, 2nd ed., 7.2–7.4, 9.3.
 pub fn fit_fopdt(problem: &FitProblem) -> Result<FopdtFit, FitError> {
+    fit_with_stretch(problem).map(|(_, fit)| fit)
+}
+
+/// [`fit_fopdt`], and the stretch with the rows that counted.
+pub(super) fn fit_with_stretch<'a>(problem: &FitProblem<'a>) -> Result<(Stretch<'a>, FopdtFit), FitError> {
     let stretch = problem.stretch()?;
     let bounds = Bounds::of(&stretch);
     let mut work = Work { passes: 0, thinned: 0 };
@@ -95,23 +102,29 @@ pub fn fit_fopdt(problem: &FitProblem) -> Result<FopdtFit, FitError> {
         pv_name: problem.options.pv_name.clone(),
         mv_name: problem.options.mv_name.clone(),
     };
-    let mut best = descend(&stretch, &bounds, &mut work);
-    best = try_fast_dynamics(&stretch, best, &bounds, &mut work);
-    let best = look_around(&stretch, best.ok_or_else(nothing)?, &bounds, &mut work);
+    let (known, best) = descend(&stretch, &bounds, &mut work);
+    let best = try_fast_dynamics(&stretch, &known, best, &bounds, &mut work);
+    let best = look_around(&known, best.ok_or_else(nothing)?, &bounds, &mut work);
+    let refit = |known: &Stretch, from: &Point| {
+        let found = refine(known, from.dynamics, &bounds, PASSES, &mut work.passes)?;
+        Some(look_around(known, found, &bounds, &mut work))
+    };
+    let (stretch, best) = settled(&stretch, known, best, |at| reaches_s(&stretch, at), refit);
     let mut fit = report(&stretch, &best).ok_or_else(nothing)?;
     let error_s = fit.standard_error.dead_time_s;
-    let t95 = student_95(stretch.len().saturating_sub(stretch.unknowns()));
+    let t95 = student_95(stretch.kept().saturating_sub(stretch.unknowns()));
     if let Some(interval) = dead_time_interval(&stretch, &best, &bounds, error_s, t95, &mut work.passes) {
         fit.interval_95.dead_time_s = interval;
     }
     (fit.passes, fit.thinned_passes) = (work.passes, work.thinned);
-    Ok(fit)
+    Ok((stretch, fit))
 }
 
 /// Dynamics faster than the thinned-out copies show, or an MV that repeats itself faster, can send the search astray:
 /// starts again from the liveliest rows at full resolution, and goes on from there if all rows agree.
 fn try_fast_dynamics(
     stretch: &Stretch,
+    known: &Stretch,
     best: Option<Point>,
     bounds: &Bounds,
     work: &mut Work,
@@ -125,11 +138,11 @@ fn try_fast_dynamics(
     }
     let window = liveliest(stretch);
     let window_bounds = Bounds::of(&window);
-    let Some(found) = descend(&window, &window_bounds, &mut Work { passes: 0, thinned: 0 }) else {
+    let Some(found) = descend(&window, &window_bounds, &mut Work { passes: 0, thinned: 0 }).1 else {
         return best;
     };
     let Some(best) = best else {
-        return refine(stretch, found.dynamics, bounds, PASSES, &mut work.passes);
+        return refine(known, found.dynamics, bounds, PASSES, &mut work.passes);
     };
     let (a, b) = (best.dynamics, found.dynamics);
     let alike = (a.time_constant_s / b.time_constant_s).ln().abs() < 0.5
@@ -139,9 +152,16 @@ fn try_fast_dynamics(
     }
     work.passes += 1;
     let promising =
-        evaluate(stretch, b, &no_reference(stretch)).filter(|p| p.rss() < WORTH_REFINING * best.rss());
-    let again = promising.and_then(|_| refine(stretch, b, bounds, PASSES, &mut work.passes));
+        evaluate(known, b, &no_reference(known)).filter(|p| p.rss() < WORTH_REFINING * best.rss());
+    let again = promising.and_then(|_| refine(known, b, bounds, PASSES, &mut work.passes));
     better(Some(best), again)
+}
+
+/// How far back a fit looks, with and without room for doubt about its dead time.
+fn reaches_s(stretch: &Stretch, at: &Point) -> [f64; 2] {
+    let spare = stretch.kept().saturating_sub(stretch.unknowns()).max(1) as f64;
+    let error_s = covariance(at, at.rss() / spare)[2][2].sqrt();
+    reach_s(at.dynamics.dead_time_s, error_s)
 }
 
 struct Work {
@@ -156,8 +176,8 @@ fn better(a: Option<Point>, b: Option<Point>) -> Option<Point> {
     }
 }
 
-/// From the thinnest copy to all rows.
-fn descend(stretch: &Stretch, bounds: &Bounds, work: &mut Work) -> Option<Point> {
+/// From the thinnest copy to all rows; with those of them that the dead time of the copies leaves to count.
+fn descend<'a>(stretch: &Stretch<'a>, bounds: &Bounds, work: &mut Work) -> (Stretch<'a>, Option<Point>) {
     let mut copies: Vec<Stretch> = Vec::new();
     while let Some(factor) = {
         let rows = copies.last().unwrap_or(stretch).len();
@@ -172,16 +192,19 @@ fn descend(stretch: &Stretch, bounds: &Bounds, work: &mut Work) -> Option<Point>
     for start in starts(coarsest) {
         best = better(best, refine(coarsest, start, bounds, PASSES, &mut count));
     }
-    let mut best = best?;
-    if copies.is_empty() {
+    let (Some(mut best), Some(first_copy)) = (best.clone(), copies.first()) else {
         work.passes += count;
-        return Some(best);
-    }
+        return (stretch.clone(), best);
+    };
     for copy in copies.iter().rev().skip(1) {
         best = refine(copy, best.dynamics, bounds, PASSES, &mut count).unwrap_or(best);
     }
     work.thinned += count;
-    refine(stretch, best.dynamics, bounds, PASSES, &mut work.passes)
+    // A copy tells the dead time to a part of its step.
+    let reach_s = reaches_s(first_copy, &best)[0] + 0.5 * first_copy.sample_time_s;
+    let known = stretch.known_after(reach_s).unwrap_or_else(|| stretch.clone());
+    let found = refine(&known, best.dynamics, bounds, PASSES, &mut work.passes);
+    (known, found)
 }
 
 /// The cost has a kink wherever L passes a row: tries the neighbouring cells where the rows are far apart.
@@ -220,7 +243,7 @@ fn liveliest<'a>(s: &Stretch<'a>) -> Stretch<'a> {
     (window.t, window.u, window.y) = (slice(&s.t), slice(&s.u), slice(&s.y));
     window.u_before = u_before;
     window.segments.truncate(1);
-    window.free = s.free || first > 0;
+    window.at_rest = s.at_rest && first == 0;
     window
 }
 
@@ -233,8 +256,10 @@ fn report(stretch: &Stretch, best: &Point) -> Option<FopdtFit> {
     let linear = &best.projected.linear;
     let model = Fopdt::new(linear.gain, time_constant_s, dead_time_s).ok()?;
     let (simulated, rss) = free_run(stretch, best.dynamics, linear);
-    let rows = stretch.len();
-    let movement = summed(&stretch.y, |y| (y - stretch.y_ref).powi(2));
+    let rows = stretch.kept();
+    let movement: f64 = (0..stretch.segments.len())
+        .map(|s| summed(&stretch.y[stretch.known(s)], |y| (y - stretch.y_ref).powi(2)))
+        .sum();
     let freedom = rows.saturating_sub(stretch.unknowns()).max(1);
     let covariance = covariance(best, rss / freedom as f64);
     let standard_error = Spread {
@@ -268,13 +293,15 @@ fn report(stretch: &Stretch, best: &Point) -> Option<FopdtFit> {
 }
 
 fn free_run(stretch: &Stretch, dynamics: Dynamics, linear: &Linear) -> (Vec<f64>, f64) {
-    let mut simulated = Vec::with_capacity(stretch.len());
+    let mut simulated = vec![f64::NAN; stretch.len()];
     let mut rss = 0.0;
     residuals(stretch, dynamics, linear, |first, r| {
-        simulated.extend(stretch.y[first..first + r.len()].iter().zip(r).map(|(y, r)| y - r));
+        for (i, r) in r.iter().enumerate() {
+            simulated[first + i] = stretch.y[first + i] - r;
+        }
         rss += r.iter().map(|r| r * r).sum::<f64>();
     });
-    (simulated, rss)
+    (stretch.filled_back(simulated), rss)
 }
 
 /// Covariance of (K, T, L) from that of (bias, K, ln T, L/T).

@@ -50,7 +50,7 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
     if fit.segments > 1 {
         found.push(FitVerdict::Segments { count: fit.segments });
     }
-    if !stretch.free {
+    if stretch.at_rest {
         found.push(FitVerdict::StartsAtRest { mv_before: stretch.u_before });
     }
     found

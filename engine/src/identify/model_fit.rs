@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fopdt::Interval;
-use super::output_error::Symmetric;
+use super::output_error::{Point, Symmetric};
 use super::parameters::{Coordinates, Parameter};
 use super::residual_tests::ResidualTests;
 use super::{FitVerdict, Structure};
@@ -41,7 +41,7 @@ pub struct ModelFit {
     pub mv_at_rest: Option<f64>,
     /// Slow drift of the PV that goes with no input, in PV units per second, with its interval.
     pub drift: Option<(f64, Interval)>,
-    /// Modelled PV of the first row, in PV units.
+    /// Modelled PV of the first row fitted, in PV units.
     pub initial_pv: f64,
     /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖) of the free run.
     pub fit_percent: f64,
@@ -57,7 +57,7 @@ pub struct ModelFit {
     pub rows: usize,
     /// Pieces between gaps.
     pub segments: usize,
-    /// Free run ŷ, one value a row, in PV units.
+    /// Free run ŷ, one value a row, in PV units; ahead of the first row fitted, the value there.
     pub simulated: Vec<f64>,
     /// Residuals y − ŷ, 0 where a row did not count, in PV units.
     pub residuals: Vec<f64>,
@@ -72,6 +72,10 @@ pub struct ModelFit {
     /// Two-sided 95 % quantile the intervals use.
     pub(super) student: f64,
     pub(super) coordinates: Coordinates,
+    /// How far back the fit looks, in seconds: its dead time with room for doubt.
+    pub(super) reach_s: f64,
+    /// For each segment the first row whose PV counted.
+    pub(super) known_from: Vec<usize>,
 }
 
 /// A point of a Nyquist curve with its uncertainty.
@@ -98,6 +102,17 @@ impl ModelFit {
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
+    }
+
+    /// The dynamics as points of the search: of the MV, then of each disturbance.
+    pub(super) fn points(&self) -> Vec<Point> {
+        let main = self.coordinates.point();
+        let of = |d: &DisturbanceFit| {
+            let value = |name| d.parameters.iter().find(|p| p.name == name).map(|p| p.value);
+            let time_s = value("T_s").unwrap_or(main.time_s);
+            Point { time_s, zeta: 1.0, dead_time_s: value("L_s").unwrap_or(0.0) }
+        };
+        std::iter::once(main).chain(self.disturbances.iter().map(of)).collect()
     }
 
     /// Adds to the covariance what else is unknown; an interval by likelihood ratio grows on both sides.

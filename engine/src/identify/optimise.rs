@@ -56,7 +56,7 @@ impl Point {
 /// One pass over the stretch at (T, L).
 pub(super) fn evaluate(stretch: &Stretch, dynamics: Dynamics, reference: &Linear) -> Option<Point> {
     let grams = pass(stretch, dynamics, reference);
-    let projected = project(&grams, reference, stretch.free)?;
+    let projected = project(&grams, reference, stretch.has_free())?;
     projected.rss.is_finite().then_some(Point { dynamics, projected })
 }
 
@@ -75,7 +75,7 @@ pub(super) fn refine(
 ) -> Option<Point> {
     *evaluations += 1;
     let start = evaluate(stretch, bounds.clip(start), &no_reference(stretch))?;
-    let spare = stretch.len().saturating_sub(stretch.unknowns()).max(1) as f64;
+    let spare = stretch.kept().saturating_sub(stretch.unknowns()).max(1) as f64;
     let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
     let step = |at: &Point, damping: f64| {
         let reduced = reduce(&at.projected);

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::FitError;
+use super::known::History;
 use super::statistics::{is_even, mean, summed};
 
 /// Fewest rows a fit accepts: the model has five unknowns.
@@ -84,6 +85,9 @@ pub struct FitProblem<'a> {
     pub disturbances: Vec<Disturbance<'a>>,
     /// Rows whose PV counts; absent: all. The MV of the others holds all the same.
     pub keep: Option<Cow<'a, [bool]>>,
+    /// The inputs ahead of the first row, where the stretch was cut out of a longer log; of no use with
+    /// [`FitOptions::mv_before`].
+    pub history: Option<History<'a>>,
 }
 
 /// Another input of the PV, with its own dynamics.
@@ -99,7 +103,15 @@ impl<'a> FitProblem<'a> {
     /// A stretch with default options.
     #[must_use]
     pub fn new(time_s: &'a [f64], pv: &'a [f64], mv: &'a [f64]) -> Self {
-        Self { time_s, pv, mv, options: FitOptions::default(), disturbances: vec![], keep: None }
+        Self {
+            time_s,
+            pv,
+            mv,
+            options: FitOptions::default(),
+            disturbances: vec![],
+            keep: None,
+            history: None,
+        }
     }
 
     /// Checks the columns and finds the sample time and the segments.
@@ -133,6 +145,9 @@ impl<'a> FitProblem<'a> {
         let free = o.initial_state == InitialState::Free && !mv_still;
         let mut stretch = Stretch::new(self.time_s.into(), self.mv.into(), self.pv.into(), u_before, free);
         stretch.others = self.disturbances.iter().map(|d| Other::new(d.values.into())).collect();
+        stretch.mv_before_told = o.mv_before.is_some();
+        let usable = |h: &&History<'a>| h.fits(self.disturbances.len(), self.time_s[0]);
+        stretch.past = self.history.as_ref().filter(usable).cloned();
         if let Some(keep) = self.keep.clone().filter(|keep| keep.len() == stretch.len()) {
             stretch.keep_only(keep);
         }
@@ -243,8 +258,16 @@ pub(super) struct Stretch<'a> {
     pub uniform: bool,
     /// First row of each segment; the first is 0.
     pub segments: Vec<usize>,
-    /// Whether the initial state of each segment is estimated.
-    pub free: bool,
+    /// Rows at the start of each segment whose PV answers an MV that is not known; none where absent.
+    pub unknown: Vec<usize>,
+    /// Whether the first segment starts at rest; the state of every other is estimated.
+    pub at_rest: bool,
+    /// Whether `u_before` is what the user says, not a guess.
+    pub mv_before_told: bool,
+    /// Inputs ahead of the first row.
+    pub past: Option<History<'a>>,
+    /// How many of the rows are history.
+    pub history: usize,
     /// Further inputs.
     pub others: Vec<Other<'a>>,
     /// Rows whose PV counts; absent: all.
@@ -260,7 +283,7 @@ pub(super) struct Other<'a> {
 }
 
 impl<'a> Other<'a> {
-    fn new(values: Cow<'a, [f64]>) -> Self {
+    pub fn new(values: Cow<'a, [f64]>) -> Self {
         Self { before: values[0], reference: mean(&values), values }
     }
 }
@@ -291,16 +314,37 @@ impl<'a> Stretch<'a> {
         let sample_time_s = if uniform { even } else { typical_step(&t, even) };
         let mut segments = vec![0];
         if !uniform {
-            let gap = GAP_SAMPLES * sample_time_s * (1.0 + UNIFORM_TOLERANCE);
-            segments.extend((1..rows).filter(|&k| t[k] - t[k - 1] > gap));
+            let gap_s = gap_s(sample_time_s);
+            segments.extend((1..rows).filter(|&k| t[k] - t[k - 1] > gap_s));
             if segments.len() > rows / MIN_ROWS {
                 // Rows this scattered have no sample time to speak of: one segment, exact stamps.
                 segments.truncate(1);
             }
         }
         let (u_ref, y_ref) = (mean(&u), mean(&y));
-        let (others, keep) = (vec![], None);
-        Self { t, u, y, u_before, u_ref, y_ref, sample_time_s, uniform, segments, free, others, keep }
+        Self {
+            t,
+            u,
+            y,
+            u_before,
+            u_ref,
+            y_ref,
+            sample_time_s,
+            uniform,
+            segments,
+            unknown: vec![],
+            at_rest: !free,
+            mv_before_told: false,
+            past: None,
+            history: 0,
+            others: vec![],
+            keep: None,
+        }
+    }
+
+    /// Longest time between two rows of one segment, in seconds.
+    pub fn gap_s(&self) -> f64 {
+        gap_s(self.sample_time_s)
     }
 
     /// Lets only the rows marked with `true` count.
@@ -313,11 +357,15 @@ impl<'a> Stretch<'a> {
 
     /// Rows that count.
     pub fn kept(&self) -> usize {
-        self.keep.as_ref().map_or(self.len(), |keep| keep.iter().filter(|k| **k).count())
+        let known = (0..self.segments.len()).map(|s| self.known(s));
+        match &self.keep {
+            None => known.map(|rows| rows.len()).sum(),
+            Some(keep) => known.map(|rows| keep[rows].iter().filter(|k| **k).count()).sum(),
+        }
     }
 
-    /// Whether a row counts.
-    pub fn counts(&self, row: usize) -> bool {
+    /// Whether a row may count, be it known or not.
+    pub fn is_kept(&self, row: usize) -> bool {
         self.keep.as_ref().is_none_or(|keep| keep[row])
     }
 
@@ -349,7 +397,7 @@ impl<'a> Stretch<'a> {
 
     /// Number of unknowns of the FOPDT model on this stretch.
     pub fn unknowns(&self) -> usize {
-        4 + if self.free { self.segments.len() } else { 0 }
+        4 + self.live_segments() - usize::from(self.at_rest)
     }
 
     /// A copy with one row for each `factor`: the MV's mean from that row to the next, the PV's mean around it.
@@ -374,13 +422,13 @@ impl<'a> Stretch<'a> {
                 if self.keep.is_none() {
                     y.push(mean(&self.y[around]));
                 } else {
-                    let kept: Vec<f64> = around.filter(|&k| self.counts(k)).map(|k| self.y[k]).collect();
+                    let kept: Vec<f64> = around.filter(|&k| self.is_kept(k)).map(|k| self.y[k]).collect();
                     keep.push(!kept.is_empty());
                     y.push(if kept.is_empty() { self.y_ref } else { mean(&kept) });
                 }
             }
         }
-        let mut copy = Stretch::new(t.into(), u.into(), y.into(), self.u_before, self.free);
+        let mut copy = Stretch::new(t.into(), u.into(), y.into(), self.u_before, !self.at_rest);
         copy.others = others
             .into_iter()
             .zip(&self.others)
@@ -388,6 +436,9 @@ impl<'a> Stretch<'a> {
             .collect();
         if self.keep.is_some() {
             copy.keep_only(keep.into());
+        }
+        if self.unknown.iter().any(|rows| *rows > 0) && copy.segments.len() == self.segments.len() {
+            copy.unknown = self.unknown.iter().map(|rows| rows.div_ceil(factor)).collect();
         }
         copy
     }
@@ -403,6 +454,10 @@ impl<'a> Stretch<'a> {
         }
         (first..last).map(|k| values[k] * (self.t[k + 1] - self.t[k])).sum::<f64>() / length
     }
+}
+
+fn gap_s(sample_time_s: f64) -> f64 {
+    GAP_SAMPLES * sample_time_s * (1.0 + UNIFORM_TOLERANCE)
 }
 
 /// Median of the positive steps; of a sample of them when there are many.

@@ -25,7 +25,7 @@ pub(super) fn dead_time_interval(
     if !coarse || stretch.len() > MANY_ROWS {
         return None;
     }
-    let variance = best.rss() / stretch.len().saturating_sub(stretch.unknowns()).max(1) as f64;
+    let variance = best.rss() / stretch.kept().saturating_sub(stretch.unknowns()).max(1) as f64;
     // Signed root of the likelihood ratio, close to (L − L̂)/se.
     let ratio = |dead_time_s: f64| {
         let point = refine_time_constant(stretch, best, dead_time_s, bounds, passes)?;

@@ -21,17 +21,12 @@ pub(super) struct Dynamics {
 
 /// One pass over a stretch: the Gram matrix of each segment, residuals taken against `reference`.
 pub(super) fn pass(stretch: &Stretch, dynamics: Dynamics, reference: &Linear) -> Vec<Gram> {
-    let mut grams = Vec::with_capacity(stretch.segments.len());
-    blocks(stretch, dynamics, reference, |segment, _, block| {
-        if grams.len() <= segment {
-            grams.push(Gram::zero());
-        }
-        grams[segment].add(block);
-    });
+    let mut grams = vec![Gram::zero(); stretch.segments.len()];
+    blocks(stretch, dynamics, reference, |segment, _, block| grams[segment].add(block));
     grams
 }
 
-/// Residuals against `linear` row by row, handed on in blocks with the number of their first row.
+/// Residuals against `linear` of the known rows, handed on in blocks with the number of their first row.
 pub(super) fn residuals(
     stretch: &Stretch,
     dynamics: Dynamics,
@@ -60,13 +55,21 @@ fn blocks(
     let mut decay = Decay { step_s: f64::NAN, value: 0.0 };
     for segment in 0..stretch.segments.len() {
         let range = stretch.segment(segment);
-        let mut free = Free { start_s: stretch.t[range.start], gone: !stretch.free };
+        let known = stretch.known(segment);
+        let start_s = stretch.t[known.start.min(range.end - 1)];
+        let mut free = Free { start_s, gone: !stretch.is_free(segment) };
         let mut first = range.start;
         while first < range.end {
-            let rows = (range.end - first).min(BLOCK);
+            let end = if first < known.start { known.start } else { range.end };
+            let rows = (end - first).min(BLOCK);
             match &grid {
                 Some(grid) => state.fill_on_grid(grid, stretch, first, rows, &mut block),
                 None => state.fill(stretch, dynamics, &mut decay, first, rows, &mut block),
+            }
+            if first < known.start {
+                state.flush();
+                first += rows;
+                continue;
             }
             free.fill(stretch, dynamics.time_constant_s, first, rows, &mut block);
             residual(stretch, reference, segment, first, rows, &mut block);

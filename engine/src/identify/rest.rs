@@ -42,6 +42,11 @@ fn starts_at_rest(problem: &FitProblem) -> bool {
     {
         return false;
     }
+    // What the MV did ahead of the stretch may still be on its way.
+    let span_s = problem.time_s[problem.time_s.len() - 1] - problem.time_s[0];
+    if problem.history.as_ref().is_some_and(|history| history.moves_within(span_s, problem.time_s[0])) {
+        return false;
+    }
     let rows = &problem.pv[..rest];
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let range = |values: &[f64]| {

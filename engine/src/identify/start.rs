@@ -22,7 +22,7 @@ pub(super) fn starts(stretch: &Stretch) -> Vec<Dynamics> {
     let even = Even::of(stretch);
     let mut chosen: Vec<Dynamics> = Vec::new();
     for free in [true, false] {
-        if free && !stretch.free {
+        if free && stretch.at_rest {
             continue;
         }
         let mut found: Vec<(f64, Dynamics)> = Vec::new();

@@ -198,7 +198,7 @@ impl std::fmt::Display for FitVerdict {
             ),
             Self::ResidualsFollowInput { correlation, lag } => write!(
                 f,
-                "what the model leaves over still follows the MV (correlation {} after {lag} rows): the process has more in it than this structure",
+                "what the model leaves over still follows the MV (correlation {} after {lag} rows): the process has more in it than this structure, and the intervals are those of a structure that holds: too narrow",
                 n(*correlation)
             ),
             Self::Drift { per_hour } => {

@@ -123,4 +123,12 @@ impl LogTable {
         }
         rows
     }
+
+    /// The rows ahead of a time, where these columns hold a number.
+    #[must_use]
+    pub fn ahead(&self, columns: &[&[f64]], start_s: f64) -> CompleteRows {
+        let end = self.time_s.partition_point(|t| *t < start_s);
+        let last_s = end.checked_sub(1).map_or(f64::NEG_INFINITY, |row| self.time_s[row]);
+        self.complete(columns, f64::NEG_INFINITY, last_s)
+    }
 }

@@ -1,12 +1,13 @@
 //! The data of a fit, taken out of the window so that a job can have it.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use vasos_engine::document::{Document, FittedRows, LogRoles, ModelOrigin, NewModel, SourceChoice, Stretch};
 use vasos_engine::excitation::{ExcitationReport, identify_report};
 use vasos_engine::identify::{
-    Disturbance, Drift, FitOptions, FitProblem, LoopRecord, LoopStudy, ModeColumn, Structure, StudyOptions,
-    reaction_curve, study_loop,
+    Disturbance, Drift, FitOptions, FitProblem, History, LoopRecord, LoopStudy, ModeColumn, Structure,
+    StudyOptions, reaction_curve, study_loop,
 };
 use vasos_engine::signal::{ChannelKind, LogTable};
 
@@ -25,6 +26,8 @@ pub struct FitData {
     mode: Option<Vec<f64>>,
     mode_words: Vec<String>,
     disturbance: Option<(String, Vec<f64>)>,
+    /// The inputs ahead of the stretch.
+    ahead: History<'static>,
     options: FitOptions,
     structure: Option<Structure>,
     origin: ModelOrigin,
@@ -38,6 +41,7 @@ impl FitData {
     pub fn fit(self) -> Outcome {
         let mut problem = FitProblem::new(&self.time_s, &self.pv, &self.mv);
         problem.options = self.options;
+        problem.history = Some(self.ahead.borrowed());
         problem.disturbances = self
             .disturbance
             .iter()
@@ -89,6 +93,14 @@ fn of_log(log: &LogTable, roles: LogRoles, state: &State, stretch: Stretch) -> R
     columns.extend(other.map(|c| c.values.as_slice()));
     let rows = log.complete(&columns, stretch.from_s, stretch.to_s);
     let first_row = rows.first_line(log);
+    let start_s = rows.time_s.first().copied().unwrap_or(stretch.from_s);
+    let ahead = log.ahead(&columns[1..], start_s);
+    let mut inputs_ahead = ahead.columns.into_iter().map(Cow::Owned);
+    let ahead = History {
+        time_s: ahead.time_s.into(),
+        mv: inputs_ahead.next().unwrap_or_default(),
+        disturbances: inputs_ahead.collect(),
+    };
     let beside = |role: Option<usize>| column(role).and_then(|c| rows.held(&c.values));
     let (sp, mode) = (beside(roles.sp), beside(roles.mode));
     let mut values = rows.columns.into_iter();
@@ -114,6 +126,7 @@ fn of_log(log: &LogTable, roles: LogRoles, state: &State, stretch: Stretch) -> R
         mode,
         mode_words: column(roles.mode).map(|c| c.states.clone()).unwrap_or_default(),
         disturbance: other.map(|c| c.name.clone()).zip(values.next()),
+        ahead,
         origin: ModelOrigin::Log { name: log.name.clone(), stretch },
         pv_unit: pv.unit.clone().unwrap_or_default(),
         mv_unit: mv.unit.clone().unwrap_or_default(),
@@ -131,7 +144,14 @@ fn of_run(
     let (Some(pv), Some(mv)) = columns else { return Err(tr!("identify.no_data")) };
     let sp = run.column(ChannelKind::Setpoint(focus));
     // Another configuration is another loop: only what came after the last change is of this one.
-    let from_s = run.last_change_s(stretch.to_s).map_or(stretch.from_s, |s| s.max(stretch.from_s));
+    let change_s = run.last_change_s(stretch.to_s).unwrap_or(f64::NEG_INFINITY);
+    let from_s = change_s.max(stretch.from_s);
+    let rows_ahead = mv.index_at(change_s)..mv.index_at(from_s);
+    let ahead = History {
+        time_s: mv.time_s()[rows_ahead.clone()].to_vec().into(),
+        mv: mv.values()[rows_ahead].to_vec().into(),
+        disturbances: vec![],
+    };
     let range = pv.index_at(from_s)..pv.index_at(stretch.to_s);
     let active = document.rig.active_loops().get(focus);
     let spec = &document.rig.network.spec;
@@ -154,6 +174,7 @@ fn of_run(
         mode: None,
         mode_words: Vec::new(),
         disturbance: None,
+        ahead,
         time_s,
         options: FitOptions {
             pv_name: "PV".to_owned(),

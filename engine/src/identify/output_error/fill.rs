@@ -16,17 +16,12 @@ pub(in crate::identify) fn grams(
     points: &[Point],
     reference: &Linear,
 ) -> Vec<Gram> {
-    let mut grams: Vec<Gram> = Vec::with_capacity(stretch.segments.len());
-    blocks(stretch, shape, points, reference, |segment, _, columns| {
-        if grams.len() <= segment {
-            grams.push(Gram::zero(shape.columns()));
-        }
-        grams[segment].add(columns);
-    });
+    let mut grams = vec![Gram::zero(shape.columns()); stretch.segments.len()];
+    blocks(stretch, shape, points, reference, |segment, _, columns| grams[segment].add(columns));
     grams
 }
 
-/// Visits every block: segment, first row, columns.
+/// Visits every block of known rows: segment, first row, columns.
 pub(in crate::identify) fn blocks(
     stretch: &Stretch,
     shape: &Shape,
@@ -42,13 +37,20 @@ pub(in crate::identify) fn blocks(
     let middle_s = 0.5 * (stretch.t[0] + stretch.t[stretch.len() - 1]);
     for segment in 0..stretch.segments.len() {
         let range = stretch.segment(segment);
-        let start_s = stretch.t[range.start];
+        let known = stretch.known(segment);
+        let start_s = stretch.t[known.start.min(range.end - 1)];
+        let is_free = match (shape.free, stretch.is_free(segment)) {
+            (false, _) => Free::Absent,
+            (true, false) => Free::Empty,
+            (true, true) => Free::Estimated,
+        };
         let mut modes: Vec<Modes> = (0..points.len())
-            .map(|i| Modes::new(shape.channels[i], points[i], shape.places[i].free, start_s, shape.free))
+            .map(|i| Modes::new(shape.channels[i], points[i], shape.places[i].free, start_s, is_free))
             .collect();
         let mut first = range.start;
         while first < range.end {
-            let rows = (range.end - first).min(ROWS);
+            let end = if first < known.start { known.start } else { range.end };
+            let rows = (end - first).min(ROWS);
             columns.rows = rows;
             columns.values[ONE][..rows].fill(1.0);
             if let Some(drift) = shape.drift_column {
@@ -58,6 +60,10 @@ pub(in crate::identify) fn blocks(
             }
             for channel in &mut channels {
                 channel.fill(stretch, first, rows, &mut columns);
+            }
+            if first < known.start {
+                first += rows;
+                continue;
             }
             for mode in &mut modes {
                 mode.fill(stretch, first, rows, &mut columns);
@@ -243,18 +249,28 @@ impl<'a, K: Kernel> Feed<'a, K> {
     }
 }
 
+/// What becomes of the columns of a segment's free modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Free {
+    /// The shape has none.
+    Absent,
+    /// The segment starts at rest.
+    Empty,
+    Estimated,
+}
+
 /// The free modes of a channel within a segment.
 struct Modes {
     order: Order,
     point: Point,
     column: usize,
     start_s: f64,
-    free: bool,
+    free: Free,
     gone: bool,
 }
 
 impl Modes {
-    fn new(order: Order, point: Point, column: usize, start_s: f64, free: bool) -> Self {
+    fn new(order: Order, point: Point, column: usize, start_s: f64, free: Free) -> Self {
         Self { order, point, column, start_s, free, gone: false }
     }
 
@@ -264,11 +280,12 @@ impl Modes {
             Order::Integrator => 0,
             Order::Second { .. } => 6,
         };
-        if !self.free {
+        if self.free == Free::Absent {
             return;
         }
-        columns.alive[self.column..self.column + count].fill(!self.gone);
-        if self.gone {
+        let alive = self.free == Free::Estimated && !self.gone;
+        columns.alive[self.column..self.column + count].fill(alive);
+        if !alive {
             return;
         }
         match self.order {

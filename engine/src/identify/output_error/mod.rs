@@ -19,5 +19,5 @@ pub(super) use descend::{Found, evaluate, refine};
 pub(super) use fill::blocks;
 pub(super) use profile::{Around, dead_time_interval, is_wide};
 pub(super) use project::Symmetric;
-pub(super) use search::{Near, Work, search};
+pub(super) use search::{Near, Work, again, search};
 pub(super) use shape::{Linear, Order, Point, Shape};

@@ -57,6 +57,17 @@ pub(in crate::identify) fn search(
     Some(look_around(stretch, shape, found, work))
 }
 
+/// The best point next to one that was found on nearly the same rows.
+pub(in crate::identify) fn again(
+    stretch: &Stretch,
+    shape: &Shape,
+    points: &[Point],
+    work: &mut Work,
+) -> Option<Found> {
+    let found = refine(stretch, shape, points, PASSES, &mut work.passes)?;
+    Some(look_around(stretch, shape, found, work))
+}
+
 /// The cost has a kink wherever a dead time passes a row: tries the neighbouring cells where the rows are far apart.
 fn look_around(stretch: &Stretch, shape: &Shape, best: Found, work: &mut Work) -> Found {
     const CELL_PASSES: usize = 12;

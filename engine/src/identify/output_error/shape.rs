@@ -164,7 +164,9 @@ impl Shape {
 
     /// Number of all unknowns on a stretch.
     pub fn parameters(&self, stretch: &Stretch) -> usize {
-        self.unknowns + self.shared.len() + self.local.len() * stretch.segments.len()
+        let modes = self.local.iter().filter(|t| t.column != ONE).count();
+        let at_rest = if stretch.at_rest { modes } else { 0 };
+        self.unknowns + self.shared.len() + self.local.len() * stretch.live_segments() - at_rest
     }
 
     /// First unknown of a channel.

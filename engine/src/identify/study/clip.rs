@@ -9,9 +9,10 @@ use std::borrow::Cow;
 
 use super::clip_fit::{LimitsFit, clipped, descend, without_idle};
 use super::valve::{Valve, holding_cost};
-use crate::identify::fit_structure::shape_of;
-use crate::identify::output_error::{Near, Point, Shape, Work, search};
-use crate::identify::problem::Stretch;
+use crate::identify::fit_structure::{free_run, shape_of};
+use crate::identify::output_error::{Linear, Near, Point, Shape, Work, evaluate, refine, search};
+use crate::identify::problem::{Other, Stretch};
+use crate::identify::statistics::mean;
 use crate::identify::{FitProblem, Structure};
 
 /// Rows of the copy on which the grid is tried.
@@ -20,6 +21,8 @@ const ROWS: usize = 700;
 const PARTS: usize = 7;
 /// Valleys descended on the copy, and on all rows.
 const VALLEYS: [usize; 2] = [10, 3];
+/// Passes of a fit that starts next to its end.
+const PASSES: usize = 20;
 /// Limits closer than this part of their distance are the same.
 const ALIKE: f64 = 0.02;
 /// The squared residual must fall to this part, or the limits explain nothing.
@@ -45,6 +48,13 @@ pub(super) enum Seen {
     Nothing,
     /// Limits behind the log.
     Limits(Limits),
+    /// No limits: beyond these levels of the MV the gain is another.
+    GainChanges {
+        /// In MV units.
+        limits: [f64; 2],
+        /// The gain beyond them, in percent of that between.
+        percent: f64,
+    },
     /// A valve that moves only once it was asked for that much, in MV units.
     Holds(f64),
 }
@@ -60,7 +70,7 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     let mut levels = sorted.clone();
     levels.dedup();
     // An MV of few levels is a hand's: what it asked for, it got.
-    if levels.len() < 30 || problem.pv.len() < 50 || !problem.disturbances.is_empty() {
+    if levels.len() < 30 || problem.pv.len() < 50 {
         return None;
     }
     let stretch = problem.stretch().ok()?;
@@ -68,23 +78,37 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     let short = mended(&stretch);
     let shape = shape_of(&stretch, Structure::Fopdt, false);
     let whole = [sorted[0], sorted[sorted.len() - 1]];
-    let cost = |limits: [f64; 2]| tried(&clipped(&short, limits, factor), &shape);
-    let (plain, plain_point) = cost(whole)?;
-    if fit_percent(&clipped(&short, whole, factor), plain) > GOOD_PERCENT {
+    // The grid is tried on the MV alone: what disturbances do is known well enough to find the valleys.
+    let (of_mv, others) = without_others(&short, factor, &shape)?;
+    let alone = shape_of(&of_mv, Structure::Fopdt, false);
+    let cost = |limits: [f64; 2]| {
+        let (rss, point) = tried(&clipped(&of_mv, limits, factor), &alone)?;
+        Some((rss, [vec![point], others.clone()].concat()))
+    };
+    let (plain, plain_points) = cost(whole)?;
+    if fit_percent(&clipped(&of_mv, whole, factor), plain) > GOOD_PERCENT {
         return None;
     }
-    let mut valleys: Vec<(f64, [f64; 2], Point)> = vec![(plain, whole, plain_point)];
+    let mut valleys = vec![(plain, whole, plain_points.clone())];
     let levels = grid(&sorted);
     // Both together: with a valve that jumps between its limits neither alone explains anything.
     for (i, &low) in levels.iter().enumerate() {
         for &high in &levels[i + 1..] {
-            valleys.extend(cost([low, high]).map(|(rss, point)| (rss, [low, high], point)));
+            valleys.extend(cost([low, high]).map(|(rss, points)| (rss, [low, high], points)));
         }
     }
     valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
     let on_copy = deepest(&short, factor, &shape, &valleys, VALLEYS[0]);
     let least = on_copy.first()?.rss;
-    if let Some(Valve { band, rss }) = holding_cost(&short, factor, |held| tried(held, &shape))
+    // What a valve hides goes into the disturbances' share: there both are fitted together again.
+    let behind = |held: &Stretch| {
+        if others.is_empty() {
+            tried(held, &alone).map(|(rss, _)| rss)
+        } else {
+            refine(held, &shape, &plain_points, PASSES, &mut 0).map(|found| found.rss())
+        }
+    };
+    if let Some(Valve { band, rss }) = holding_cost(&short, factor, behind)
         && rss < least
     {
         return (rss < FALL * plain).then_some(Seen::Holds(band));
@@ -92,7 +116,8 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     if least > 1.5 * FALL * plain {
         return None;
     }
-    let starts: Vec<_> = on_copy.iter().map(|f| (f.rss, f.limits, f.found.points[0])).collect();
+    let starts: Vec<_> = on_copy.iter().map(|f| (f.rss, f.limits, f.found.points.clone())).collect();
+    let stretch = stretch.known_after(starts[0].2[0].dead_time_s).unwrap_or(stretch);
     let found = deepest(&stretch, 1, &shape, &starts, VALLEYS[1]);
     let best = without_idle(&stretch, &shape, found.first()?.clone());
     // What a larger model explains without limits is no sign of any.
@@ -105,9 +130,61 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
     // A limit beyond which next to nothing lies is none.
     let beyond = problem.mv.iter().filter(|u| !(best.limits[0]..=best.limits[1]).contains(*u)).count();
     (best.rss < without[0].min(without[1]) && 100 * beyond > problem.mv.len()).then(|| {
+        if let Some(percent) = gain_beyond(&stretch, &best, &shape) {
+            return Seen::GainChanges { limits: best.limits, percent };
+        }
         let others = found[1..].iter().map(|f| (f.limits, f.rss / best.rss)).collect();
         Seen::Limits(Limits { best: best.limits, others })
     })
+}
+
+/// The gain beyond limits in percent of that between them, where it is not next to nothing as behind a real limit.
+///
+/// What lies beyond goes in as an input of its own with the process's dynamics: a limit leaves it no gain.
+fn gain_beyond(stretch: &Stretch, at: &LimitsFit, shape: &Shape) -> Option<f64> {
+    /// Percent up to which limits that are a little off explain it.
+    const NOTHING: f64 = 12.0;
+    /// The squared residual must fall to this part.
+    const FALL: f64 = 0.9;
+    let mut within = clipped(stretch, at.limits, 1);
+    let past =
+        |u: &[f64]| -> Vec<f64> { u.iter().map(|u| u - u.clamp(at.limits[0], at.limits[1])).collect() };
+    within.others.push(Other::new(past(&stretch.u).into()));
+    let channels = [shape.channels.clone(), vec![shape.channels[0]]].concat();
+    let wide = Shape::new(channels, shape.drift, shape.free);
+    let mut points = at.found.points.clone();
+    points.push(points[0]);
+    let found = evaluate(&within, &wide, points, &Linear::zero(&wide, &within))?;
+    let gain = |channel: usize| found.projected.linear.shared[wide.gains[channel]];
+    let percent = 100.0 * gain(wide.gains.len() - 1) / gain(0);
+    (found.rss() < FALL * at.rss && percent.abs() > NOTHING).then_some(percent)
+}
+
+/// A copy without what disturbances do to the PV with a process that has no limits, and the dynamics of each.
+fn without_others<'a>(
+    stretch: &Stretch<'a>,
+    factor: usize,
+    shape: &Shape,
+) -> Option<(Stretch<'a>, Vec<Point>)> {
+    let mut out = stretch.clone();
+    if stretch.others.is_empty() {
+        return Some((out, vec![]));
+    }
+    let copy = if factor > 1 { stretch.thinned(factor) } else { stretch.clone() };
+    let found = search(&copy, shape, &Near::default(), &mut Work::default())?;
+    let mut whole = evaluate(stretch, shape, found.points, &Linear::zero(shape, stretch))?;
+    let linear = &mut whole.projected.linear;
+    linear.local.iter_mut().for_each(|state| state.fill(0.0));
+    for (i, coefficient) in linear.shared.iter_mut().enumerate() {
+        if !shape.gains[1..].contains(&i) {
+            *coefficient = 0.0;
+        }
+    }
+    let (of_others, _) = free_run(stretch, shape, &whole);
+    out.y = stretch.y.iter().zip(of_others).map(|(y, other)| y - (other - stretch.y_ref)).collect();
+    out.y_ref = mean(&out.y);
+    out.others.clear();
+    Some((out, whole.points[1..].to_vec()))
 }
 
 /// Levels of the MV at which limits are tried; `sorted` holds its rows.
@@ -152,12 +229,12 @@ fn deepest(
     stretch: &Stretch,
     factor: usize,
     shape: &Shape,
-    starts: &[(f64, [f64; 2], Point)],
+    starts: &[(f64, [f64; 2], Vec<Point>)],
     count: usize,
 ) -> Vec<LimitsFit> {
     let mut found: Vec<LimitsFit> = Vec::new();
-    for (_, limits, point) in starts.iter().take(count) {
-        if let Some(fit) = descend(stretch, factor, shape, *limits, &[*point]) {
+    for (_, limits, points) in starts.iter().take(count) {
+        if let Some(fit) = descend(stretch, factor, shape, *limits, points) {
             match found.iter_mut().find(|other| are_alike(other.limits, fit.limits)) {
                 Some(other) if fit.rss < other.rss => *other = fit,
                 Some(_) => {}

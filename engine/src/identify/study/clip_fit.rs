@@ -178,6 +178,12 @@ fn range(values: &[f64]) -> [f64; 2] {
     values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)])
 }
 
+/// The stretch of a problem with the rows that a fit of it counted.
+fn stretch_like<'a>(problem: &FitProblem<'a>, fit: &ModelFit) -> Option<Stretch<'a>> {
+    let stretch = problem.stretch().ok()?;
+    Some(stretch.known_after(fit.reach_s).unwrap_or(stretch))
+}
+
 /// The shape of a fit, on its stretch.
 fn shape_like(stretch: &Stretch, fit: &ModelFit) -> Shape {
     shape_of(stretch, fit.structure, fit.drift.is_some())
@@ -185,9 +191,9 @@ fn shape_like(stretch: &Stretch, fit: &ModelFit) -> Shape {
 
 /// Limits descended again with the structure of a fit; `problem` holds the MV as it was logged.
 pub(super) fn descend_with(problem: &FitProblem, limits: [f64; 2], fit: &ModelFit) -> Option<[f64; 2]> {
-    let stretch = problem.stretch().ok()?;
+    let stretch = stretch_like(problem, fit)?;
     let shape = shape_like(&stretch, fit);
-    descend(&stretch, 1, &shape, limits, &[fit.coordinates.point()]).map(|f| f.limits)
+    descend(&stretch, 1, &shape, limits, &fit.points()).map(|f| f.limits)
 }
 
 /// Lets the uncertainty of the limits into the intervals of a fit, and gives their standard errors; `problem` holds the
@@ -200,9 +206,9 @@ pub(super) fn allow_for_limits(
     limits: [f64; 2],
     fit: &mut ModelFit,
 ) -> Option<[f64; 2]> {
-    let stretch = problem.stretch().ok()?;
+    let stretch = stretch_like(problem, fit)?;
     let shape = shape_like(&stretch, fit);
-    let at = fit_at(&stretch, 1, &shape, limits, &[fit.coordinates.point()])?;
+    let at = fit_at(&stretch, 1, &shape, limits, &fit.points())?;
     let slopes = Slopes::of(&stretch, 1, &shape, &at)?;
     let inverse = slopes.inverse()?;
     let variance = slopes.variance(&shape, &at) * fit.tests.rows_per_independent;
@@ -229,9 +235,6 @@ pub(super) fn allow_for_limits(
         }
     }
     fit.widen(&added);
-    let kept = FitProblem { mv: &clipped(&stretch, limits, 1).u, ..problem.clone() };
-    if let Ok(kept_stretch) = kept.stretch() {
-        fit.verdicts = judge::of_model(fit, &kept_stretch, &kept);
-    }
+    fit.verdicts = judge::of_model(fit, &clipped(&stretch, limits, 1), problem);
     Some([covariance(0, 0).sqrt(), covariance(1, 1).sqrt()])
 }

@@ -1,6 +1,7 @@
 //! Rows of a log that are no measurements: frozen, repeated, struck by a spike; and an MV at its limits.
 
 use super::finding::RecordFinding;
+use super::interpolated::values_kept;
 use super::spikes::spikes;
 use crate::identify::statistics::resolution;
 
@@ -34,6 +35,11 @@ pub(super) fn condition(rows: &Rows) -> Conditioned {
     let Rows { time_s, pv, mv, first_row, .. } = *rows;
     let mut keep = vec![true; pv.len()];
     let mut findings = Vec::new();
+    if let Some(kept) = values_kept(time_s, pv, mv) {
+        keep.fill(false);
+        kept.iter().for_each(|&row| keep[row] = true);
+        findings.push(RecordFinding::Interpolated { values: kept.len(), rows: pv.len() });
+    }
     let runs = runs(pv);
     let repeated = repeated(pv, &runs);
     if let Some(rows) = repeated {
@@ -54,7 +60,7 @@ pub(super) fn condition(rows: &Rows) -> Conditioned {
             times: frozen.len(),
         });
     }
-    let spikes = spikes(pv, &keep);
+    let spikes = spikes(pv, mv, &keep);
     if let Some(&first) = spikes.first() {
         for &row in &spikes {
             keep[row] = false;

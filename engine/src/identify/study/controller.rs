@@ -96,6 +96,10 @@ pub(super) fn fit_controller(columns: &Columns) -> Option<ControllerFit> {
 
 /// Regressors of a move: proportional, integral, derivative, and a constant where the setpoint is unknown.
 const COUNT: usize = 4;
+/// Place of the constant.
+const CONSTANT: usize = 3;
+/// Part of the moves' squares that rounding of a log may leave.
+const ROUNDING: f64 = 1e-12;
 
 fn regress(c: &Columns, stride: usize, lag: usize, b: f64) -> Option<ControllerFit> {
     let rows = moves(c, stride, lag, b);
@@ -186,9 +190,10 @@ fn solve(rows: &[Move], wanted: &[bool; COUNT]) -> Option<Solved> {
     let size = places.len();
     let mut matrix = Symmetric::zero(size);
     let mut rhs = vec![0.0; size];
-    let mut total = 0.0;
+    let (mut total, mut of_constant) = (0.0, [0.0; 2]);
     for (x, y) in rows {
         total += y * y;
+        of_constant = [of_constant[0] + x[CONSTANT] * y, of_constant[1] + x[CONSTANT] * x[CONSTANT]];
         for (a, &i) in places.iter().enumerate() {
             rhs[a] += x[i] * y;
             for (b, &j) in places.iter().enumerate() {
@@ -213,6 +218,10 @@ fn solve(rows: &[Move], wanted: &[bool; COUNT]) -> Option<Solved> {
         out.errors[i] = (variance * inverse.at(a, a)).sqrt();
         out.cross[i] = variance * inverse.at(0, a);
     }
-    out.r2 = if total > 0.0 { 1.0 - left / total } else { 0.0 };
+    // A straight line of the MV is no answer to the PV, nor is what rounding leaves of one.
+    let line =
+        if wanted[CONSTANT] { of_constant[0].powi(2) / of_constant[1].max(f64::MIN_POSITIVE) } else { 0.0 };
+    let answered = total - line;
+    out.r2 = if answered > ROUNDING * total { 1.0 - left / answered } else { 0.0 };
     (out.values[0].is_finite() && out.values[0] != 0.0).then_some(out)
 }

@@ -76,8 +76,8 @@ fn sample_time(time_s: &[f64]) -> f64 {
 /// inverse of a controller, which feedback alone would show, has none.
 pub(super) fn is_by_hand(
     controller: &ControllerFit,
+    record: &LoopRecord,
     problem: &FitProblem,
-    mv: &[f64],
     fits: &[ModelFit],
 ) -> bool {
     /// Part of the MV's moves up to which rounding of a log reaches.
@@ -87,12 +87,48 @@ pub(super) fn is_by_hand(
     /// A law that explains this part of the moves is at work, however long the MV rests between them.
     const EXACT: f64 = 0.95;
     let h_s = sample_time(problem.time_s);
-    if !fits.iter().any(|fit| explains(fit, h_s)) {
+    let explaining: Vec<&ModelFit> = fits.iter().filter(|fit| explains(fit, h_s)).collect();
+    if explaining.is_empty() {
         return false;
     }
-    let Some(own) = OwnPast::of(mv, controller.stride) else { return false };
+    if is_still(record) && explaining.iter().any(|fit| is_inverse(controller, fit)) {
+        return true;
+    }
+    let left = 1.0 - controller.r2;
+    // What follows the law to the last digit was computed by it.
+    if left <= ROUNDING {
+        return false;
+    }
+    let Some(own) = OwnPast::of(record.problem.mv, controller.stride) else { return false };
     let between_corners = controller.r2 < EXACT && own.miss < TYPICAL * controller.miss;
-    between_corners || own.part <= (1.0 - controller.r2) + ROUNDING
+    between_corners || own.part <= left + ROUNDING
+}
+
+/// Whether the law is the process read backwards: u = (y + T ẏ)/K, a slow hand's moves out of the PV's answer to them.
+///
+/// A controller of that gain would feed back the wrong way, with no integral action.
+fn is_inverse(controller: &ControllerFit, fit: &ModelFit) -> bool {
+    /// Kc K of the inverse of a first order is −1; noise of the PV and moves as fast as the process take from it.
+    const GAIN: std::ops::Range<f64> = -1.25..0.0;
+    /// Time constants of the process beyond which an integral is none.
+    const SLOW: f64 = 10.0;
+    let time = |name| fit.parameter(name).map_or(0.0, |p| p.value);
+    let gain = fit.parameters[0].value * controller.kc;
+    let integrates = controller.ti_s.is_some_and(|ti| ti < SLOW * (time("T_s") + time("L_s")));
+    fit.structure != Structure::Ipdt && GAIN.contains(&gain) && !integrates
+}
+
+/// Whether the setpoint never moves, or is not known to.
+fn is_still(record: &LoopRecord) -> bool {
+    record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]))
+}
+
+/// Whether a controller was read from most of the moves that no limit cut off. What a few rows show, such as those ahead of
+/// a test, says nothing of the rest.
+pub(super) fn reigns(controller: &ControllerFit, saturated: &[bool]) -> bool {
+    let needed = 2 * controller.stride + controller.lag_rows + 1;
+    let free = saturated.windows(needed).filter(|rows| rows.iter().all(|s| !s)).count();
+    2 * controller.rows * controller.stride > free
 }
 
 /// Whether a process without a zero explains the PV, to its noise or nearly, and lags the MV.
@@ -143,6 +179,7 @@ pub(super) fn refuse_feedback(
     record: &LoopRecord,
     problem: &FitProblem,
     controller: Option<&ControllerFit>,
+    saturated: &[bool],
     choice: &mut Choice,
 ) {
     /// Part of the MV's moves that feedback explains where nothing else moves it.
@@ -151,11 +188,9 @@ pub(super) fn refuse_feedback(
     const FEW_MOVES: usize = 5;
     /// Fit in percent from which a few moves of the setpoint do tell the process.
     const TOLD_PERCENT: f64 = 75.0;
-    // What a few rows show, such as those ahead of a test, says nothing of the rest.
-    let rows = problem.time_s.len();
-    let throughout = |c: &&ControllerFit| 2 * c.rows * c.stride > rows;
+    let throughout = |c: &&ControllerFit| reigns(c, saturated);
     let Some(controller) = controller.filter(|c| c.r2 > FEEDBACK).filter(throughout) else { return };
-    let still = record.sp.is_none_or(|sp| sp.iter().all(|v| *v == sp[0]));
+    let still = is_still(record);
     let one_mode = record.mode.is_none_or(|mode| mode.values.iter().all(|m| *m == mode.values[0]));
     let other_excitation = problem.disturbances.iter().any(|d| d.values.iter().any(|v| *v != d.values[0]));
     if still && one_mode && !other_excitation {

@@ -10,6 +10,13 @@ pub enum RecordFinding {
         /// Rows a value is held for.
         rows: usize,
     },
+    /// The PV was filled in by straight lines between the values read.
+    Interpolated {
+        /// Values between which the lines run.
+        values: usize,
+        /// All rows.
+        rows: usize,
+    },
     /// The PV stood still while it should have shown its noise.
     Frozen {
         /// Rows left out.
@@ -57,6 +64,20 @@ pub enum RecordFinding {
         limits: [f64; 2],
         /// Rows beyond them.
         rows: usize,
+    },
+    /// Limits of the MV that the user gave.
+    MvLimitsGiven {
+        /// Range of the MV within them, in MV units.
+        limits: [f64; 2],
+        /// Rows beyond them.
+        rows: usize,
+    },
+    /// The gain is another beyond some level of the MV: the process is not linear.
+    GainChanges {
+        /// Levels at which it changes, in MV units.
+        limits: [f64; 2],
+        /// The gain beyond them, in percent of that between.
+        percent: f64,
     },
     /// Other limits of the MV would explain the PV as well.
     MvLimitsUnknown {
@@ -117,6 +138,10 @@ impl std::fmt::Display for RecordFinding {
                 f,
                 "the PV changes only every {rows} rows: the log is written faster than the PV is read, and each value counts once"
             ),
+            Self::Interpolated { values, rows } => write!(
+                f,
+                "the PV runs in straight lines between {values} of its {rows} rows: what lies between was filled in, not measured, and only those {values} count"
+            ),
             Self::Frozen { rows, from_s, to_s, times } => write!(
                 f,
                 "the PV stands still without its noise, {times} times, first from {} to {} s: {rows} rows were left out",
@@ -139,18 +164,10 @@ impl std::fmt::Display for RecordFinding {
                 "the MV is at its limit {} for {rows} rows: there the controller does not act",
                 n(*limit)
             ),
-            Self::MvBeyondLimits { limits, rows } => write!(
-                f,
-                "the PV follows the MV only between {} and {}: it was logged ahead of its limits, {rows} rows lie beyond and were taken at the limit",
-                n(limits[0]),
-                n(limits[1])
-            ),
-            Self::MvLimitsUnknown { limits } => write!(
-                f,
-                "the limits of the MV ({} and {}) cannot be told from this stretch, and T and L depend on them: give them with --mv-min and --mv-max",
-                n(limits[0]),
-                n(limits[1])
-            ),
+            Self::MvBeyondLimits { .. }
+            | Self::MvLimitsGiven { .. }
+            | Self::GainChanges { .. }
+            | Self::MvLimitsUnknown { .. } => self.write_limits(f),
             Self::ValveHolds { band } => write!(
                 f,
                 "the PV follows the MV as behind a valve that moves only once it was asked for about {}: it sticks or has play, and the model holds for larger moves only",
@@ -195,12 +212,15 @@ impl Explain for RecordFinding {
     fn key(&self) -> &'static str {
         match self {
             Self::Oversampled { .. } => "record.oversampled",
+            Self::Interpolated { .. } => "record.interpolated",
             Self::Frozen { .. } => "record.frozen",
             Self::Outliers { .. } => "record.outliers",
             Self::MvSlips { .. } => "record.mv_slips",
             Self::Quantised { .. } => "record.quantised",
             Self::MvAtLimit { .. } => "record.mv_at_limit",
             Self::MvBeyondLimits { .. } => "record.mv_beyond_limits",
+            Self::MvLimitsGiven { .. } => "record.mv_limits_given",
+            Self::GainChanges { .. } => "record.gain_changes",
             Self::MvLimitsUnknown { .. } => "record.mv_limits_unknown",
             Self::ValveHolds { .. } => "record.valve_holds",
             Self::MvEarlier => "record.mv_earlier",
@@ -217,6 +237,7 @@ impl Explain for RecordFinding {
         let whole = |name: &'static str, value: &usize| (name, value.to_string());
         match self {
             Self::Oversampled { rows } => vec![whole("rows", rows)],
+            Self::Interpolated { values, rows } => vec![whole("values", values), whole("rows", rows)],
             Self::Frozen { rows, from_s, to_s, times } => {
                 vec![whole("rows", rows), n("from_s", from_s), n("to_s", to_s), whole("times", times)]
             }
@@ -225,8 +246,11 @@ impl Explain for RecordFinding {
             }
             Self::Quantised { step } => vec![n("step", step)],
             Self::MvAtLimit { limit, rows } => vec![n("limit", limit), whole("rows", rows)],
-            Self::MvBeyondLimits { limits, rows } => {
+            Self::MvBeyondLimits { limits, rows } | Self::MvLimitsGiven { limits, rows } => {
                 vec![n("low", &limits[0]), n("high", &limits[1]), whole("rows", rows)]
+            }
+            Self::GainChanges { limits, percent } => {
+                vec![n("low", &limits[0]), n("high", &limits[1]), n("percent", percent)]
             }
             Self::MvLimitsUnknown { limits } => vec![n("low", &limits[0]), n("high", &limits[1])],
             Self::ValveHolds { band } => vec![n("band", band)],
@@ -245,6 +269,39 @@ impl Explain for RecordFinding {
 }
 
 impl RecordFinding {
+    /// What is said of limits of the MV; nothing for the others.
+    fn write_limits(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::MvBeyondLimits { limits, rows } => write!(
+                f,
+                "the PV follows the MV only between {} and {}, as where the MV is logged ahead of its limits: {rows} rows lie beyond and were taken at the limit",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            Self::MvLimitsGiven { limits, rows } => write!(
+                f,
+                "{rows} rows of the MV lie beyond the limits given and were taken at them: it is between {} and {}",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            Self::GainChanges { limits, percent } => write!(
+                f,
+                "the gain changes with the MV: below {} and above {} it is about {} % of that between; one linear model holds for neither, fit a stretch on one side",
+                n(limits[0]),
+                n(limits[1]),
+                n(*percent)
+            ),
+            Self::MvLimitsUnknown { limits } => write!(
+                f,
+                "the limits of the MV ({} and {}) cannot be told from this stretch, and T and L depend on them: give them with --mv-min and --mv-max",
+                n(limits[0]),
+                n(limits[1])
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether an engineer should act on it.
     #[must_use]
     pub fn is_warning(&self) -> bool {
@@ -254,6 +311,7 @@ impl RecordFinding {
                 | Self::WrongSign { .. }
                 | Self::UnstableTuning { .. }
                 | Self::MvBeyondLimits { .. }
+                | Self::GainChanges { .. }
                 | Self::MvLimitsUnknown { .. }
                 | Self::ValveHolds { .. }
         )
@@ -264,12 +322,15 @@ impl RecordFinding {
     pub fn samples() -> Vec<Self> {
         vec![
             Self::Oversampled { rows: 4 },
+            Self::Interpolated { values: 121, rows: 1201 },
             Self::Frozen { rows: 60, from_s: 120.0, to_s: 180.0, times: 2 },
             Self::Outliers { count: 3, row: 17, value: -999.0 },
             Self::MvSlips { count: 1, row: 40, value: 500.0 },
             Self::Quantised { step: 0.35 },
             Self::MvAtLimit { limit: 100.0, rows: 42 },
             Self::MvBeyondLimits { limits: [0.0, 60.0], rows: 250 },
+            Self::MvLimitsGiven { limits: [12.5, 60.0], rows: 250 },
+            Self::GainChanges { limits: [20.0, 60.0], percent: 31.0 },
             Self::MvLimitsUnknown { limits: [35.0, 49.0] },
             Self::ValveHolds { band: 1.4 },
             Self::MvEarlier,

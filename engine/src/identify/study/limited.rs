@@ -2,7 +2,7 @@
 
 use super::clip::{self, Seen};
 use super::{RecordFinding, StudyOptions, clip_fit};
-use crate::identify::{Choice, FitError, FitProblem, InitialState, Structure, choose_from_rest};
+use crate::identify::{Choice, FitError, FitProblem, History, InitialState, Structure, choose_from_rest};
 
 /// A limit known to less than this part of the distance of both is none that the log tells.
 const UNKNOWN: f64 = 0.25;
@@ -24,17 +24,40 @@ pub(super) fn choose(
     options: &StudyOptions,
     findings: &mut Vec<RecordFinding>,
 ) -> Limited {
-    if let Some(limits) = options.mv_limits {
-        return at(problem, limits, structures, findings);
+    let Some(given) = options.mv_limits else {
+        let seen = if options.as_is { Seen::Nothing } else { clip::look(problem) };
+        return at_seen(problem, seen, structures, findings);
+    };
+    let rows = beyond(problem.mv, given);
+    let (mv, history) = clamped(problem, given);
+    let mut kept = FitProblem { mv: &mv, history, ..problem.clone() };
+    kept.options.mv_before = kept.options.mv_before.map(|u| u.clamp(given[0], given[1]));
+    if rows > 0 {
+        findings.push(RecordFinding::MvLimitsGiven { limits: range(&mv), rows });
     }
-    match if options.as_is { Seen::Nothing } else { clip::look(problem) } {
-        Seen::Limits(found) => at_found(problem, &found, structures, findings),
-        Seen::Holds(band) => {
-            findings.push(RecordFinding::ValveHolds { band });
-            as_logged(problem, structures)
+    // A side of which nothing was said may have its limit in the log.
+    let one_sided = given.iter().any(|limit| limit.is_infinite());
+    let seen = if one_sided && !options.as_is { clip::look(&kept) } else { Seen::Nothing };
+    let out = at_seen(&kept, seen, structures, findings);
+    let taken = out.mv.or((rows > 0).then_some(mv));
+    Limited { mv: taken, ..out }
+}
+
+fn at_seen(
+    problem: &FitProblem,
+    seen: Seen,
+    structures: &[Structure],
+    findings: &mut Vec<RecordFinding>,
+) -> Limited {
+    match seen {
+        Seen::Limits(found) => return at_found(problem, &found, structures, findings),
+        Seen::Holds(band) => findings.push(RecordFinding::ValveHolds { band }),
+        Seen::GainChanges { limits, percent } => {
+            findings.push(RecordFinding::GainChanges { limits, percent });
         }
-        Seen::Nothing => as_logged(problem, structures),
+        Seen::Nothing => {}
     }
+    as_logged(problem, structures)
 }
 
 fn as_logged(problem: &FitProblem, structures: &[Structure]) -> Limited {
@@ -42,9 +65,19 @@ fn as_logged(problem: &FitProblem, structures: &[Structure]) -> Limited {
     Limited { mv: None, choice, initial_state }
 }
 
+fn range(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+}
+
+/// The MV of a problem, and that of its history, within limits.
+fn clamped<'a>(problem: &FitProblem<'a>, [low, high]: [f64; 2]) -> (Vec<f64>, Option<History<'a>>) {
+    let mv = problem.mv.iter().map(|u| u.clamp(low, high)).collect();
+    (mv, problem.history.as_ref().map(|history| history.within([low, high])))
+}
+
 fn within(problem: &FitProblem, [low, high]: [f64; 2], structures: &[Structure]) -> Limited {
-    let mv: Vec<f64> = problem.mv.iter().map(|u| u.clamp(low, high)).collect();
-    let mut kept = FitProblem { mv: &mv, ..problem.clone() };
+    let (mv, history) = clamped(problem, [low, high]);
+    let mut kept = FitProblem { mv: &mv, history, ..problem.clone() };
     kept.options.mv_before = kept.options.mv_before.map(|u| u.clamp(low, high));
     let (choice, initial_state) = choose_from_rest(&kept, structures);
     Limited { mv: Some(mv), choice, initial_state }
@@ -52,20 +85,6 @@ fn within(problem: &FitProblem, [low, high]: [f64; 2], structures: &[Structure])
 
 fn beyond(mv: &[f64], limits: [f64; 2]) -> usize {
     mv.iter().filter(|u| !(limits[0]..=limits[1]).contains(*u)).count()
-}
-
-fn at(
-    problem: &FitProblem,
-    limits: [f64; 2],
-    structures: &[Structure],
-    findings: &mut Vec<RecordFinding>,
-) -> Limited {
-    let rows = beyond(problem.mv, limits);
-    if rows == 0 {
-        return as_logged(problem, structures);
-    }
-    findings.push(RecordFinding::MvBeyondLimits { limits, rows });
-    within(problem, limits, structures)
 }
 
 /// Limits found with a first order, descended again with the structure that is chosen behind them; their uncertainty

@@ -10,8 +10,10 @@ mod condition;
 mod controller;
 mod feedback;
 mod finding;
+mod interpolated;
 mod limited;
 mod mode;
+mod pulses;
 mod spikes;
 mod stiction;
 mod valve;
@@ -29,7 +31,7 @@ use super::{
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
 use condition::{Rows, condition, mended, slips};
-use feedback::{controller_of, is_by_hand, refuse_feedback};
+use feedback::{controller_of, is_by_hand, refuse_feedback, reigns};
 use limited::Limited;
 
 /// What is asked of a study.
@@ -125,10 +127,10 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     problem.options.initial_state = initial_state;
     let mut controller = controller_of(&record, &problem, &saturated, &mut findings);
     if let Ok(choice) = &choice {
-        controller = controller.filter(|c| !is_by_hand(c, &problem, record.problem.mv, &choice.fits));
+        controller = controller.filter(|c| !is_by_hand(c, &record, &problem, &choice.fits));
     }
     if let Ok(choice) = &mut choice {
-        refuse_feedback(&record, &problem, controller.as_ref(), choice);
+        refuse_feedback(&record, &problem, controller.as_ref(), &saturated, choice);
     }
     let earlier = one_row_earlier(problem.mv);
     if !options.as_is
@@ -137,10 +139,11 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
         choice = Ok(better);
         findings.push(RecordFinding::MvEarlier);
     }
-    if let (Ok(choice), Some(controller)) = (&choice, &controller) {
+    let reigning = controller.as_ref().filter(|c| reigns(c, &saturated));
+    if let (Ok(choice), Some(controller)) = (&choice, reigning) {
         of_the_loop(controller, choice, &mut findings);
     }
-    let oscillation = oscillation_of(&problem, controller.as_ref(), choice.as_ref().ok(), &mut findings);
+    let oscillation = oscillation_of(&problem, reigning, choice.as_ref().ok(), &mut findings);
     let reaction_curve = reaction_curve(&problem);
     Ok(LoopStudy { choice, controller, oscillation, reaction_curve, findings })
 }
@@ -170,7 +173,8 @@ fn answered_in_the_same_row(
     if !(at_once && no_dead_time) {
         return None;
     }
-    let shifted = FitProblem { mv: earlier, ..problem.clone() };
+    let history = problem.history.as_ref().map(|history| history.one_row_earlier(problem.mv[0]));
+    let shifted = FitProblem { mv: earlier, history, ..problem.clone() };
     let other = choose_among(&shifted, structures).ok()?;
     (other.chosen().mse < FALL * fit.mse && other.chosen().is_usable()).then_some(other)
 }
@@ -194,7 +198,12 @@ fn check_length(record: &LoopRecord) -> Result<(), FitError> {
 /// What model and controller say of each other.
 fn of_the_loop(controller: &ControllerFit, choice: &Choice, findings: &mut Vec<RecordFinding>) {
     let fit = choice.chosen();
-    if !fit.is_usable() || controller.r2 < 0.5 {
+    // A model that leaves a pattern of its own accuses nobody.
+    let is_in_doubt = fit.verdicts.iter().any(|verdict| {
+        use super::FitVerdict::{Poor, ResidualsFollowInput, Rings};
+        matches!(verdict, Poor { .. } | Rings { .. } | ResidualsFollowInput { .. })
+    });
+    if !fit.is_usable() || is_in_doubt || controller.r2 < 0.5 {
         return;
     }
     let gain = fit.parameters[0].value;
@@ -219,7 +228,9 @@ fn oscillation_of(
 ) -> Option<Oscillation> {
     // An open loop swings with what a hand does: no sign of the valve.
     controller.filter(|c| c.r2 > 0.3)?;
-    let integrating = choice.is_some_and(|c| matches!(c.chosen().model, ProcessModel::Ipdt(_)));
+    // What was refused tells no structure either.
+    let fit = choice.map(Choice::chosen).filter(|fit| fit.is_usable());
+    let integrating = fit.is_some_and(|fit| matches!(fit.model, ProcessModel::Ipdt(_)));
     let found = stiction::oscillation(problem.time_s, problem.pv, problem.mv, integrating)?;
     if found.sticks() {
         findings.push(RecordFinding::Stiction {

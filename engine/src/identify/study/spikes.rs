@@ -1,6 +1,7 @@
 //! Rows of a PV that leave their neighbours for a moment and come back.
 
 use super::condition::median;
+use super::pulses::{Excursion, answers};
 
 /// Rows on each side that a row is compared with.
 const REACH: usize = 4;
@@ -16,8 +17,9 @@ const AROUND: [f64; 2] = [0.1, 1.5];
 /// More than one row in so many is a signal of its own.
 const SELDOM: usize = 10;
 
-/// Rows that leave their neighbours on both sides for three rows at most, where these lie on a straight line.
-pub(super) fn spikes(pv: &[f64], keep: &[bool]) -> Vec<usize> {
+/// Rows that leave their neighbours on both sides for three rows at most, where these lie on a straight line and no pulse of
+/// the MV explains it.
+pub(super) fn spikes(pv: &[f64], mv: &[f64], keep: &[bool]) -> Vec<usize> {
     let rows: Vec<usize> = (0..pv.len()).filter(|&k| keep[k]).collect();
     if rows.len() < 3 * REACH {
         return vec![];
@@ -50,7 +52,19 @@ pub(super) fn spikes(pv: &[f64], keep: &[bool]) -> Vec<usize> {
             both && one_side && around.len() - calm.len() <= ROWS && leaves_line(&values, &calm, i, sigma)
         }
     };
-    let found: Vec<usize> = (0..values.len()).filter(|&i| stands_out(i)).map(|i| rows[i]).collect();
+    let out: Vec<usize> = (0..values.len()).filter(|&i| stands_out(i)).collect();
+    let groups: Vec<&[usize]> = out.chunk_by(|a, b| a + 1 == *b).collect();
+    let height = |group: &[usize]| {
+        let away = group.iter().map(|&i| values[i] - middle[i]);
+        away.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or_default()
+    };
+    let excursions: Vec<Excursion> =
+        groups.iter().map(|group| Excursion { first: rows[group[0]], height: height(group) }).collect();
+    let mut away = vec![0.0; pv.len()];
+    rows.iter().zip(values.iter().zip(&middle)).for_each(|(&row, (y, m))| away[row] = y - m);
+    let answers = answers(mv, &away, &excursions);
+    let left = groups.iter().zip(answers).filter(|(_, answer)| !answer);
+    let found: Vec<usize> = left.flat_map(|(group, _)| group.iter().map(|&i| rows[i])).collect();
     if found.len() * SELDOM > rows.len() { vec![] } else { found }
 }
 
@@ -81,7 +95,33 @@ mod tests {
     }
 
     fn found(pv: &[f64]) -> Vec<usize> {
-        spikes(pv, &vec![true; pv.len()])
+        spikes(pv, &vec![0.0; pv.len()], &vec![true; pv.len()])
+    }
+
+    /// Short pulses of the MV on a fast process were left out of the PV as spikes, and with them all that told the process.
+    #[test]
+    fn the_answer_to_a_pulse_is_no_spike() {
+        for seed in 0..4 {
+            for (lag, share) in [(1, 0.9), (3, 0.7), (12, 0.95)] {
+                for pulses in [vec![400], vec![200, 455, 620, 900], (1..20).map(|i| 60 * i).collect()] {
+                    let noise = noise(1200, 0.02, seed);
+                    let mv: Vec<f64> = (0..1200)
+                        .map(|k| if pulses.iter().any(|p| (*p..p + 2).contains(&k)) { 6.0 } else { 1.0 })
+                        .collect();
+                    let mut y = 1.0;
+                    let mut pv = vec![];
+                    for k in 0..1200_usize {
+                        pv.push(y + noise[k]);
+                        y += share * (mv[k.saturating_sub(lag)] - y);
+                    }
+                    let keep = vec![true; 1200];
+                    assert_eq!(spikes(&pv, &mv, &keep), [0; 0], "lag {lag}, share {share}, seed {seed}");
+                    // A spike of the sensor among them is one.
+                    pv[777] += 8.0;
+                    assert_eq!(spikes(&pv, &mv, &keep), [777], "lag {lag}, share {share}, seed {seed}");
+                }
+            }
+        }
     }
 
     /// A median of nine rows lies below the top of any swing: turning points were left out as spikes.

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use crate::identify::output_error::Point;
 use crate::identify::problem::Stretch;
 use crate::identify::statistics::mean;
 
@@ -24,7 +23,7 @@ pub(super) struct Valve {
 pub(super) fn holding_cost(
     stretch: &Stretch,
     factor: usize,
-    cost: impl Fn(&Stretch) -> Option<(f64, Point)>,
+    cost: impl Fn(&Stretch) -> Option<f64>,
 ) -> Option<Valve> {
     let (low, high) =
         stretch.u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), u| (a.min(*u), b.max(*u)));
@@ -34,7 +33,7 @@ pub(super) fn holding_cost(
             let u = followed(&stretch.u, |at, u| follow(at, u, band));
             let held = Stretch { u_ref: mean(&u), u: Cow::Owned(u), ..stretch.clone() };
             let held = if factor > 1 { held.thinned(factor) } else { held };
-            let Some((rss, _)) = cost(&held) else { continue };
+            let Some(rss) = cost(&held) else { continue };
             if best.is_none_or(|b| rss < b.rss) {
                 best = Some(Valve { band, rss });
             }
