@@ -4,6 +4,7 @@ use super::family::Family;
 use super::points::Points;
 use super::problem::{LoopLimits, Objective};
 use super::slice::{Allowed, Lead, LoadEnvelope, Shaped};
+use super::stabilising::OverKi;
 use super::valley::{Spot, valley};
 
 /// Shares of an interval of Kp at which the search looks first; closer at its ends, where narrow windows lie.
@@ -65,6 +66,7 @@ pub(super) enum Found {
 pub(super) struct GainSearch {
     allowed: Allowed,
     envelope: LoadEnvelope,
+    over_ki: OverKi,
 }
 
 /// What a search runs on: the processes, the points that count, limits and objective.
@@ -258,7 +260,7 @@ impl GainSearch {
             return nothing;
         }
         let mut best = nothing;
-        let mut load = false;
+        let (mut load, mut counted) = (false, false);
         for k in (0..self.allowed.intervals.len()).rev() {
             let (low, high) = self.allowed.intervals[k];
             if high.is_infinite() {
@@ -272,11 +274,18 @@ impl GainSearch {
                 Objective::Jv => 1.0 / high < best.value,
                 _ => -high < best.value,
             };
-            // From Ki = 0⁺ on nothing crosses −1; further intervals have to show that they are stable.
-            let known = low == 0.0;
-            if !better_possible || !(known || task.family.is_stable(task.shaped.lead, kp, 0.5 * (low + high)))
-            {
+            if !better_possible {
                 continue;
+            }
+            // From Ki = 0⁺ on nothing crosses −1; further intervals have to show that they are stable.
+            if low > 0.0 {
+                if !counted {
+                    self.over_ki.at(task.family, task.shaped.lead, kp);
+                    counted = true;
+                }
+                if !self.over_ki.is_stable(task.family, 0.5 * (low + high)) {
+                    continue;
+                }
             }
             let (ki, value) = if task.objective == Objective::Jv {
                 if !load {

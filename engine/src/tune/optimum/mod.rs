@@ -25,6 +25,7 @@ mod problem;
 mod simplex;
 mod slice;
 mod solve;
+mod stabilising;
 mod valley;
 
 pub use certificate::{Certificate, Limit, Optimum};
