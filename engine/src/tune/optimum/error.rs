@@ -2,7 +2,7 @@
 
 use super::certificate::Limit;
 use crate::analyze::FrequencyResponseError;
-use crate::explain::{Explain, number};
+use crate::explain::{Explain, number, told_apart};
 
 /// Why there are no best gains.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,8 +46,8 @@ pub enum OptimumError {
     #[error(
         "no {controller} controller that stabilises this process keeps {} under {}: {} is the least that any reaches, with the other limits as they are",
         .limit,
-        number(*.asked),
-        number(*.floor)
+        told_apart(*.asked, *.floor)[0],
+        told_apart(*.asked, *.floor)[1]
     )]
     Infeasible {
         /// `PI` or `PID`.
@@ -163,12 +163,15 @@ impl Explain for OptimumError {
             Self::Ms { value } | Self::Mt { value } | Self::Ju { value } | Self::Filter { value } => {
                 vec![("value", number(*value))]
             }
-            Self::Infeasible { controller, limit, asked, floor } => vec![
-                ("controller", (*controller).to_owned()),
-                ("limit", limit.to_string()),
-                ("asked", number(*asked)),
-                ("floor", number(*floor)),
-            ],
+            Self::Infeasible { controller, limit, asked, floor } => {
+                let [asked, floor] = told_apart(*asked, *floor);
+                vec![
+                    ("controller", (*controller).to_owned()),
+                    ("limit", limit.to_string()),
+                    ("asked", asked),
+                    ("floor", floor),
+                ]
+            }
             Self::InfeasibleTogether { controller, limit, floor } => vec![
                 ("controller", (*controller).to_owned()),
                 ("limit", limit.to_string()),

@@ -22,6 +22,7 @@ mod gain_search;
 mod lead_search;
 mod points;
 mod problem;
+mod relax;
 mod simplex;
 mod slice;
 mod solve;

@@ -58,8 +58,9 @@ impl Family<'_> {
     fn stabilising_one(&self, shaped: &Shaped<'_>, plant: usize) -> Vec<(f64, f64)> {
         let pieces = self.pieces(shaped, plant);
         let omega = self.plants[plant].typical_omega();
-        let stable =
-            |piece: &Piece| self.is_one_stable(plant, shaped.lead, piece.inside, SMALL * piece.inside * omega);
+        let stable = |piece: &Piece| {
+            self.is_one_stable(plant, shaped.lead, piece.inside, SMALL * piece.inside * omega)
+        };
         let counted = self.counted(shaped, plant, &pieces, omega);
         let told = |i: usize| counted.as_ref().is_none_or(|c| c[i] == Some(0));
         let mut found: Vec<usize> = (0..pieces.len()).filter(|&i| told(i) && stable(&pieces[i])).collect();
@@ -190,22 +191,28 @@ impl OverKi {
 
     fn push(&mut self, family: &Family<'_>, plant: usize, lead: Lead, kp: f64) {
         let points = &family.points;
-        let mut before: Option<(f64, f64)> = None;
-        for i in family.own_points(plant) {
+        let at_point = |i: usize| {
+            let (omega, g_sqr) = (points.omega[i], points.g_sqr[i]);
+            let filter = omega * lead.tf_s;
+            let im = omega * lead.td_s / (1.0 + filter * filter);
+            (points.g_re[i] / g_sqr + kp * (1.0 + im * filter), omega * (kp * im - points.g_im[i] / g_sqr))
+        };
+        let own = family.own_points(plant);
+        let mut before = 0.0;
+        for i in own.clone() {
             let omega = points.omega[i];
             let filter = omega * lead.tf_s;
             let im = omega * lead.td_s / (1.0 + filter * filter);
-            let r = points.g_re[i] / points.g_sqr[i] + kp * (1.0 + im * filter);
-            let ki = omega * (kp * im - points.g_im[i] / points.g_sqr[i]);
-            if let Some((r_before, ki_before)) = before
-                && (r_before > 0.0) != (r > 0.0)
-            {
+            // |G|² r has the sign of r and needs no division.
+            let r_of_g = points.g_re[i] + points.g_sqr[i] * kp * (1.0 + im * filter);
+            if i > own.start && (before > 0.0) != (r_of_g > 0.0) {
+                let [(r_before, ki_before), (r, ki)] = [i - 1, i].map(at_point);
                 let at = ki_before + (ki - ki_before) * r_before / (r_before - r);
                 if at > 0.0 {
                     self.crossings.push((plant, at, if r < 0.0 { 2 } else { -2 }));
                 }
             }
-            before = Some((r, ki));
+            before = r_of_g;
         }
     }
 
