@@ -14,6 +14,10 @@ use crate::plant::{Measurement, Network, RigError};
 use crate::session::CommandError;
 use crate::signal::LogTable;
 use crate::tune::optimum::OptimumError;
+use crate::tune::{RuleError, Ultimate};
+
+/// Tunings compared at a time: more curves than these cannot be told apart.
+const MOST_COMPARED: usize = 4;
 
 /// A change of the document.
 #[derive(Debug, Clone)]
@@ -62,6 +66,12 @@ pub enum DocumentCommand {
     TauC(String, Option<f64>),
     /// Objective and limits of the best gains.
     Optimum(OptimumSettings),
+    /// The curves of a tuning stay beside the one in view, or no longer do.
+    Compare(Candidate),
+    /// Overshoot of a setpoint step in percent for which b is chosen; `None` for none.
+    Overshoot(Option<f64>),
+    /// Ku and Pu of a test for the rules that start from them; `None` for those of the model.
+    Ultimate(Option<Ultimate>),
 }
 
 /// A model that joins the list.
@@ -109,6 +119,15 @@ pub enum DocumentError {
     /// Limits that cannot be used.
     #[error(transparent)]
     Optimum(OptimumError),
+    /// An overshoot that is no share.
+    #[error("an overshoot of {} % is not usable: give percent from 0 to 100", number(*.value))]
+    Overshoot {
+        /// Offending value in percent.
+        value: f64,
+    },
+    /// Ku and Pu that cannot be used.
+    #[error(transparent)]
+    Ultimate(RuleError),
 }
 
 impl Explain for DocumentError {
@@ -118,6 +137,8 @@ impl Explain for DocumentError {
             Self::SameColumn => "document.same_column",
             Self::EmptyStretch { .. } => "document.empty_stretch",
             Self::TauC { .. } => "document.tau_c",
+            Self::Overshoot { .. } => "document.overshoot",
+            Self::Ultimate(error) => error.key(),
             Self::Optimum(error) => error.key(),
         }
     }
@@ -127,7 +148,8 @@ impl Explain for DocumentError {
             Self::Command(error) => error.args(),
             Self::SameColumn => vec![],
             Self::EmptyStretch { from_s, to_s } => vec![("from_s", number(*from_s)), ("to_s", number(*to_s))],
-            Self::TauC { value } => vec![("value", number(*value))],
+            Self::TauC { value } | Self::Overshoot { value } => vec![("value", number(*value))],
+            Self::Ultimate(error) => error.args(),
             Self::Optimum(error) => error.args(),
         }
     }
@@ -137,7 +159,12 @@ impl DocumentError {
     /// One of each kind of its own, for the test that compares them with the translation files.
     #[must_use]
     pub fn samples() -> Vec<Self> {
-        vec![Self::SameColumn, Self::EmptyStretch { from_s: 5.0, to_s: 5.0 }, Self::TauC { value: -1.0 }]
+        vec![
+            Self::SameColumn,
+            Self::EmptyStretch { from_s: 5.0, to_s: 5.0 },
+            Self::TauC { value: -1.0 },
+            Self::Overshoot { value: -1.0 },
+        ]
     }
 }
 
@@ -167,6 +194,9 @@ impl DocumentCommand {
             Self::Candidate(_) => "candidate",
             Self::TauC(..) => "tau_c",
             Self::Optimum(_) => "optimum",
+            Self::Compare(_) => "compare",
+            Self::Overshoot(_) => "overshoot",
+            Self::Ultimate(_) => "ultimate",
         }
     }
 
@@ -181,7 +211,9 @@ impl DocumentCommand {
             | Self::Law(tag, _)
             | Self::Options(tag, _)
             | Self::PvFilter(tag, _) => Some(format!("{} {tag}", self.key())),
-            Self::Stretch(_) | Self::Candidate(_) | Self::Optimum(_) => Some(self.key().to_owned()),
+            Self::Stretch(_) | Self::Candidate(_) | Self::Optimum(_) | Self::Overshoot(_) => {
+                Some(self.key().to_owned())
+            }
             _ => None,
         }
     }
@@ -259,11 +291,34 @@ impl Document {
                 settings.limits.validated().map_err(DocumentError::Optimum)?;
                 next.optimum = *settings;
             }
+            DocumentCommand::Compare(candidate) => next.compare(candidate),
+            DocumentCommand::Overshoot(percent) => {
+                if let Some(value) = percent.filter(|v| !(0.0..=100.0).contains(v)) {
+                    return Err(DocumentError::Overshoot { value });
+                }
+                next.overshoot_percent = *percent;
+            }
+            DocumentCommand::Ultimate(ultimate) => {
+                next.ultimate =
+                    ultimate.map(Ultimate::validated).transpose().map_err(DocumentError::Ultimate)?;
+            }
             DocumentCommand::TauC(rule, None) => {
                 next.tau_c_s.remove(rule);
             }
         }
         Ok(next)
+    }
+
+    /// Takes a tuning in among those compared, the oldest making room, or out again.
+    fn compare(&mut self, candidate: &Candidate) {
+        if self.compared.contains(candidate) {
+            self.compared.retain(|c| c != candidate);
+            return;
+        }
+        if self.compared.len() >= MOST_COMPARED {
+            self.compared.remove(0);
+        }
+        self.compared.push(candidate.clone());
     }
 
     /// Carries out a command for one loop; others change nothing.
@@ -360,5 +415,6 @@ impl Document {
         self.models.push(ModelEntry { number, model, origin, fit, study, rows, pv_unit, mv_unit });
         self.model_in_use = Some(number);
         self.candidate = None;
+        self.compared.clear();
     }
 }

@@ -2,16 +2,17 @@
 
 mod limits;
 mod map;
+mod setpoint;
 
 use eframe::egui::{self, RichText};
 use egui_extras::{Column, TableBuilder};
 use vasos_engine::control::PidTuning;
 use vasos_engine::document::{Candidate, DocumentCommand};
-use vasos_engine::tune::{ControllerKind, find_rule};
+use vasos_engine::tune::{ControllerKind, detuned, find_rule};
 
 use crate::action::Action;
 use crate::panes::View;
-use crate::tuning::{OPTIMAL, PRESENT, Refusal, Refused, Row, same_units};
+use crate::tuning::{DETUNED, OPTIMAL, PRESENT, Refusal, Refused, Row, same_units};
 use crate::widgets::segmented;
 use crate::{i18n, text, theme, tr};
 
@@ -21,6 +22,11 @@ const COLUMN: f32 = 35.0;
 const ROW: f32 = 24.0;
 /// Height of the two lines of titles.
 const HEAD: f32 = 32.0;
+
+/// Height of what stands below the table before it has been drawn once.
+const BELOW: f32 = 58.0;
+/// Factor of one press of the button that makes gains calmer.
+const CALMER: f64 = 1.25;
 
 /// Form in which gains are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -36,6 +42,8 @@ pub struct State {
     kind: usize,
     form: Form,
     map: bool,
+    /// Height of what stands below the table, as it was drawn last.
+    below: Option<f32>,
     on_map: map::State,
 }
 
@@ -76,11 +84,13 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         }
     });
     limits::ui(ui, view, &mut actions);
-    let below = 58.0;
+    ultimate(ui, view, &mut actions);
+    // Buttons wrap where the pane is narrow, and the table gives them the room they took.
+    let below = state.below.unwrap_or(BELOW);
     let height = (ui.available_height() - below).max(60.0);
     if state.map {
         map::ui(ui, view, &mut state.on_map, height, &mut actions);
-        details(ui, view, &mut actions);
+        below_table(ui, view, state, &mut actions);
         return actions;
     }
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
@@ -88,8 +98,18 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         ui.spacing_mut().item_spacing = egui::vec2(3.0, 0.0);
         table(ui, view, state, height, &mut actions);
     });
-    details(ui, view, &mut actions);
+    below_table(ui, view, state, &mut actions);
     actions
+}
+
+/// The row in view in words, with what can be done with it; how high that came out is kept.
+fn below_table(ui: &mut egui::Ui, view: &View, state: &mut State, actions: &mut Vec<Action>) {
+    let shown = ui.scope(|ui| details(ui, view, actions)).response.rect;
+    let below = shown.height() + ui.spacing().item_spacing.y;
+    if state.below.is_none_or(|known| (known - below).abs() > 0.5) {
+        state.below = Some(below);
+        ui.ctx().request_repaint();
+    }
 }
 
 fn shown(state: &State, kind: ControllerKind) -> bool {
@@ -122,11 +142,13 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let chosen = row_in_view(view).map(|r| (r.rule, r.kind));
     let rows: Vec<&Row> =
         view.tuning.rows.iter().filter(|r| shown(state, r.kind) || r.rule == PRESENT).collect();
+    let place = |row: &Row| view.tuning.compared.iter().position(|c| same(c, row));
     let refusals: Vec<&Refusal> = view.tuning.refusals.iter().filter(|r| shown(state, r.kind)).collect();
     // Best gains that cannot be had stand where they would stand.
     let (first, last): (Vec<&Refusal>, Vec<&Refusal>) =
         refusals.into_iter().partition(|r| r.title_key == "rules.optimal");
-    let lead = rows.iter().take_while(|r| r.rule == PRESENT || r.rule == OPTIMAL).count();
+    let leading = |r: &Row| [PRESENT, OPTIMAL, DETUNED].contains(&r.rule);
+    let lead = rows.iter().take_while(|r| leading(r)).count();
     let entry = view.document.model();
     let (pv, mv) = entry.map_or(("", ""), |e| (e.pv_unit.as_str(), e.mv_unit.as_str()));
     // A long unit has no room above a narrow column; the pointer over the title shows it whole.
@@ -185,7 +207,8 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
                 };
                 let selected = chosen == Some((row.rule, row.kind));
                 line.set_selected(selected);
-                cells(&mut line, row, state, if selected { p.on_accent } else { p.text });
+                let ink = if selected { p.on_accent } else { p.text };
+                cells(&mut line, row, state, ink, place(row).map(|k| theme::series(&p, k + 1)));
                 if line.response().clicked() {
                     choose(row, actions);
                 }
@@ -195,18 +218,56 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
 
 /// Makes a row the one in view.
 fn choose(row: &Row, actions: &mut Vec<Action>) {
-    let candidate =
-        Candidate { rule: row.rule.to_owned(), controller: row.kind.id().to_owned(), gains: row.gains };
-    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate(row)))));
     actions.push(Action::Seal);
 }
 
-fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink: egui::Color32) {
+fn candidate(row: &Row) -> Candidate {
+    Candidate { rule: row.rule.to_owned(), controller: row.kind.id().to_owned(), gains: row.gains }
+}
+
+fn same(a: &Row, b: &Row) -> bool {
+    a.rule == b.rule && a.kind == b.kind
+}
+
+/// What a row is called.
+#[must_use]
+pub fn title(row: &Row) -> String {
+    format!("{} · {}", tr!(&row.title_key), row.kind)
+}
+
+/// Ku and Pu of a test, where rules start from them, with the way back to the model's.
+fn ultimate(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
+    let Some(found) = view.document.ultimate else { return };
+    let p = theme::palette(ui);
+    ui.horizontal_wrapped(|ui| {
+        let used = view.document.model().is_some_and(|m| same_units(view.document, m, view.focus));
+        let words = tr!("tune.ultimate", ku = text::brief(found.ku), pu = text::brief(found.pu_s));
+        let words = if used { words } else { format!("! {}", tr!("tune.ultimate_other_units")) };
+        let colour = if used { p.weak } else { p.caution };
+        ui.add(egui::Label::new(RichText::new(words).size(theme::SMALL).color(colour)).wrap());
+        if ui.small_button(tr!("tune.ultimate_of_model")).clicked() {
+            actions.push(Action::Document(DocumentCommand::Ultimate(None)));
+        }
+    });
+}
+
+fn cells(
+    line: &mut egui_extras::TableRow<'_, '_>,
+    row: &Row,
+    state: &State,
+    ink: egui::Color32,
+    compared: Option<egui::Color32>,
+) {
     let flagged = !row.valid || !row.analysis.stable;
     line.col(|ui| {
         let sign = if flagged { "! " } else { "" };
-        let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
-        let words = format!("{sign}{title} · {}", row.kind);
+        let words = format!("{sign}{}", title(row));
+        if let Some(colour) = compared {
+            let (place, dot) = ui.allocate_exact_size(egui::vec2(8.0, 8.0), egui::Sense::hover());
+            ui.painter().circle_filled(place.center(), 3.5, colour);
+            dot.on_hover_text(tr!("tune.compared"));
+        }
         ui.add(egui::Label::new(RichText::new(&words).size(theme::TABLE).color(ink)).truncate())
             .on_hover_text(words);
     });
@@ -278,6 +339,18 @@ fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
         if ui.button(tr!("tune.copy")).clicked() {
             actions.push(Action::Copy(as_text(row)));
         }
+        let compared = view.tuning.compared.iter().any(|c| same(c, row));
+        let button = egui::Button::selectable(compared, tr!("tune.compare"));
+        if ui.add(button).on_hover_text(tr!("tune.compare_hint")).clicked() {
+            actions.push(Action::Document(DocumentCommand::Compare(candidate(row))));
+        }
+        if ui.button(tr!("tune.detune")).on_hover_text(tr!("tune.detune_hint")).clicked() {
+            let calmer =
+                Candidate { rule: DETUNED.to_owned(), gains: detuned(&row.gains, CALMER), ..candidate(row) };
+            actions.push(Action::Document(DocumentCommand::Candidate(Some(calmer))));
+            actions.push(Action::Seal);
+        }
+        setpoint::ui(ui, view, actions);
         if let (Some(tau_c_s), Some(rule)) = (row.tau_c_s, find_rule(row.rule, row.kind)) {
             let name = ui.label("τc");
             let mut value = tau_c_s;
@@ -333,6 +406,7 @@ fn apply(view: &View, row: &Row, tag: String) -> Action {
     let (b, c) = settings.map_or((1.0, 0.0), |s| (s.tuning.b, s.tuning.c));
     let kept_s = settings.map_or(0.0, |s| s.pv_filter_s);
     let filter_s = new_filter_s(view, row, &tag).unwrap_or(kept_s);
+    let b = view.tuning.setpoint.flatten().map_or(b, |side| side.b);
     let tuning = PidTuning { gains: row.gains, b, c };
     Action::Document(DocumentCommand::ApplyTuning(tag, tuning, filter_s))
 }
