@@ -16,10 +16,10 @@ mod search;
 mod stability;
 mod sweep;
 
+pub(crate) use analysis::unstable_loop_poles;
 pub use analysis::{
     Analysis, Peak, Peaks, analyze, analyze_loop, is_closed_loop_stable, is_loop_stable, peaks,
 };
-pub(crate) use analysis::unstable_loop_poles;
 pub use frequency::{CurveOptions, LoopFunction, frequency_curve, frequency_range};
 pub(crate) use grid::{natural_frequencies, resonances};
 pub use measured::{FrequencyResponse, FrequencyResponseError, analyze_measured, measured_peaks};
