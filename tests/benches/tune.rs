@@ -121,7 +121,8 @@ fn loop_log(rows: usize) -> String {
 fn retuning(c: &mut Criterion) {
     let csv = loop_log(10_000);
     let read = || import_log("loop.csv", csv.as_bytes(), &ImportOptions::default()).expect("a log");
-    let columns = |log: &ImportedLog| ["pv", "mv", "sp"].map(|n| derived_column(&log.table, n).expect("a column"));
+    let columns =
+        |log: &ImportedLog| ["pv", "mv", "sp"].map(|n| derived_column(&log.table, n).expect("a column"));
     let study = |log: &ImportedLog, [pv, mv, sp]: &[Vec<f64>; 3]| {
         let mut problem = FitProblem::new(&log.table.time_s, pv, mv);
         problem.options.drift = Drift::Auto;
