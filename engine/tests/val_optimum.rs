@@ -313,6 +313,18 @@ fn a_floor_is_told_apart_from_what_was_asked() {
         OptimumError::Infeasible { controller: "PI", limit: Limit::Ms, asked: 1.000_01, floor: 1.000_012_3 };
     let said = refused.to_string();
     assert!(said.contains("1.000010") && said.contains("1.000012"), "{said}");
+    let far = OptimumError::Infeasible { controller: "PI", limit: Limit::Ms, asked: 1.000_01, floor: 1.5 };
+    assert!(far.to_string().contains("under 1.00001:"), "{far}");
+}
+
+/// A gain whose square is not a number was said to have the wrong sign.
+#[test]
+fn a_gain_beyond_all_numbers_is_called_so() {
+    for gain in [1e300, -1e-300] {
+        let model = ProcessModel::Fopdt(Fopdt::new(gain, 1.0, 1.0).expect("a model"));
+        let refused = solve(&model, Wanted::Pi, Objective::Jv, LoopLimits::DEFAULT);
+        assert_eq!(refused, Err(OptimumError::OutOfRange { gain }));
+    }
 }
 
 /// Two lags without dead time take any gain from a PID: what was a search that gave up says so.

@@ -6,15 +6,14 @@ use super::data::{
     Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
     RigSettings, SourceChoice, Stretch,
 };
+use super::error::DocumentError;
 use crate::control::{GainsError, Law, LoopOptions, LoopSpec, Mode, PidTuning, check_filter, check_loop};
-use crate::explain::{Explain, number};
 use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network, RigError};
 use crate::session::CommandError;
 use crate::signal::LogTable;
-use crate::tune::optimum::OptimumError;
-use crate::tune::{RuleError, Ultimate};
+use crate::tune::Ultimate;
 
 /// Tunings compared at a time: more curves than these cannot be told apart.
 const MOST_COMPARED: usize = 4;
@@ -91,81 +90,6 @@ pub struct NewModel {
     pub pv_unit: String,
     /// Unit of its MV.
     pub mv_unit: String,
-}
-
-/// Why the document stays as it is.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DocumentError {
-    /// The rig could not take it.
-    #[error(transparent)]
-    Command(#[from] CommandError),
-    /// PV and MV on one column.
-    #[error("PV and MV cannot be the same column; choose another one for either")]
-    SameColumn,
-    /// A stretch without length.
-    #[error("a stretch from {} s to {} s is empty; drag over a part of the trend", number(*.from_s), number(*.to_s))]
-    EmptyStretch {
-        /// Start in seconds.
-        from_s: f64,
-        /// End in seconds.
-        to_s: f64,
-    },
-    /// A free time constant that is not positive.
-    #[error("τc = {} s is not usable: it must be greater than 0", number(*.value))]
-    TauC {
-        /// Offending value in seconds.
-        value: f64,
-    },
-    /// Limits that cannot be used.
-    #[error(transparent)]
-    Optimum(OptimumError),
-    /// An overshoot that is no share.
-    #[error("an overshoot of {} % is not usable: give percent from 0 to 100", number(*.value))]
-    Overshoot {
-        /// Offending value in percent.
-        value: f64,
-    },
-    /// Ku and Pu that cannot be used.
-    #[error(transparent)]
-    Ultimate(RuleError),
-}
-
-impl Explain for DocumentError {
-    fn key(&self) -> &'static str {
-        match self {
-            Self::Command(error) => error.key(),
-            Self::SameColumn => "document.same_column",
-            Self::EmptyStretch { .. } => "document.empty_stretch",
-            Self::TauC { .. } => "document.tau_c",
-            Self::Overshoot { .. } => "document.overshoot",
-            Self::Ultimate(error) => error.key(),
-            Self::Optimum(error) => error.key(),
-        }
-    }
-
-    fn args(&self) -> Vec<(&'static str, String)> {
-        match self {
-            Self::Command(error) => error.args(),
-            Self::SameColumn => vec![],
-            Self::EmptyStretch { from_s, to_s } => vec![("from_s", number(*from_s)), ("to_s", number(*to_s))],
-            Self::TauC { value } | Self::Overshoot { value } => vec![("value", number(*value))],
-            Self::Ultimate(error) => error.args(),
-            Self::Optimum(error) => error.args(),
-        }
-    }
-}
-
-impl DocumentError {
-    /// One of each kind of its own, for the test that compares them with the translation files.
-    #[must_use]
-    pub fn samples() -> Vec<Self> {
-        vec![
-            Self::SameColumn,
-            Self::EmptyStretch { from_s: 5.0, to_s: 5.0 },
-            Self::TauC { value: -1.0 },
-            Self::Overshoot { value: -1.0 },
-        ]
-    }
 }
 
 impl DocumentCommand {
@@ -280,33 +204,47 @@ impl Document {
                     next.model_in_use = next.models.last().map(|m| m.number);
                 }
             }
-            DocumentCommand::Candidate(candidate) => next.candidate.clone_from(candidate),
+            DocumentCommand::Candidate(_)
+            | DocumentCommand::TauC(..)
+            | DocumentCommand::Optimum(_)
+            | DocumentCommand::Compare(_)
+            | DocumentCommand::Overshoot(_)
+            | DocumentCommand::Ultimate(_) => next.change_tuning(command)?,
+        }
+        Ok(next)
+    }
+
+    /// Carries out a command about what is tuned for and looked at; others change nothing.
+    fn change_tuning(&mut self, command: &DocumentCommand) -> Result<(), DocumentError> {
+        match command {
+            DocumentCommand::Candidate(candidate) => self.candidate.clone_from(candidate),
             DocumentCommand::TauC(rule, Some(value)) => {
                 if !(value.is_finite() && *value > 0.0) {
                     return Err(DocumentError::TauC { value: *value });
                 }
-                next.tau_c_s.insert(rule.clone(), *value);
+                self.tau_c_s.insert(rule.clone(), *value);
             }
             DocumentCommand::Optimum(settings) => {
                 settings.limits.validated().map_err(DocumentError::Optimum)?;
-                next.optimum = *settings;
+                self.optimum = *settings;
             }
-            DocumentCommand::Compare(candidate) => next.compare(candidate),
+            DocumentCommand::Compare(candidate) => self.compare(candidate),
             DocumentCommand::Overshoot(percent) => {
                 if let Some(value) = percent.filter(|v| !(0.0..=100.0).contains(v)) {
                     return Err(DocumentError::Overshoot { value });
                 }
-                next.overshoot_percent = *percent;
+                self.overshoot_percent = *percent;
             }
             DocumentCommand::Ultimate(ultimate) => {
-                next.ultimate =
+                self.ultimate =
                     ultimate.map(Ultimate::validated).transpose().map_err(DocumentError::Ultimate)?;
             }
             DocumentCommand::TauC(rule, None) => {
-                next.tau_c_s.remove(rule);
+                self.tau_c_s.remove(rule);
             }
+            _ => {}
         }
-        Ok(next)
+        Ok(())
     }
 
     /// Takes a tuning in among those compared, the oldest making room, or out again.

@@ -41,13 +41,18 @@ pub fn optimum(problem: &OptimumProblem<'_>) -> Result<Optimum, OptimumError> {
     validate(problem)?;
     let sign = Plant::new(&problem.processes[0]).low.coefficient.signum();
     let found = with_sign(problem, sign);
-    if !matches!(found, Err(OptimumError::NotStabilisable { .. })) {
-        return found;
-    }
-    for process in problem.processes {
-        if let Process::Measured(response) = process {
-            response.reaches_half_turn().map_err(OptimumError::Measured)?;
+    let not_stabilisable = matches!(found, Err(OptimumError::NotStabilisable { .. }));
+    // What holds these gains is not a limit but where the measurement ends.
+    let held_by_nothing = found.as_ref().is_ok_and(|f| f.certificate.active.is_empty());
+    if not_stabilisable || held_by_nothing || found == Err(OptimumError::Unbounded) {
+        for process in problem.processes {
+            if let Process::Measured(response) = process {
+                response.reaches_half_turn().map_err(OptimumError::Measured)?;
+            }
         }
+    }
+    if !not_stabilisable {
+        return found;
     }
     // An unstable process may want the other sign than its static gain has.
     with_sign(problem, -sign)
@@ -55,6 +60,10 @@ pub fn optimum(problem: &OptimumProblem<'_>) -> Result<Optimum, OptimumError> {
 
 fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, OptimumError> {
     let mut solver = Solver::new(problem, sign);
+    let lost = (0..solver.family.plants.len()).find(|&plant| solver.family.own_points(plant).is_empty());
+    if let Some(plant) = lost {
+        return Err(OptimumError::OutOfRange { gain: solver.family.plants[plant].low.coefficient });
+    }
     if let Some(refused) = floor::of_ju(&solver) {
         return Err(refused);
     }
