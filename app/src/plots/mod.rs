@@ -134,15 +134,17 @@ pub fn legend(
     colour: eframe::egui::Color32,
     others: &[(String, eframe::egui::Color32)],
 ) {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = eframe::egui::vec2(8.0, 0.0);
+    ui.scope(|ui| {
         // Rows of words, not of buttons.
         ui.spacing_mut().interact_size.y = crate::theme::SMALL + 2.0;
-        let own = std::iter::once((own, colour));
-        for (name, colour) in own.chain(others.iter().map(|(name, colour)| (name.as_str(), *colour))) {
-            let words = eframe::egui::RichText::new(format!("— {name}"));
-            ui.add(eframe::egui::Label::new(words.size(crate::theme::SMALL).color(colour)).extend());
-        }
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = eframe::egui::vec2(8.0, 0.0);
+            let own = std::iter::once((own, colour));
+            for (name, colour) in own.chain(others.iter().map(|(name, colour)| (name.as_str(), *colour))) {
+                let words = eframe::egui::RichText::new(format!("— {name}"));
+                ui.add(eframe::egui::Label::new(words.size(crate::theme::SMALL).color(colour)).extend());
+            }
+        });
     });
 }
 

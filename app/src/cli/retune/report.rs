@@ -155,12 +155,15 @@ fn model(outcome: &Outcome, blocks: &mut Vec<Block>) {
     let fit: &ModelFit = choice.chosen();
     blocks.push(Block::Heading(tr!("retuning.model")));
     let mut lines = identify::model_rows(fit).into_iter();
-    let head = lines.next().unwrap_or_default();
+    let structure = lines.next().unwrap_or_default().into_iter().next().unwrap_or_default();
+    let head = vec![structure, String::new(), tr!("retuning.interval")];
+    // What is printed says its intervals in English.
+    let between = format!(" {} ", tr!("retuning.to"));
     let mut rows: Vec<Vec<Cell>> = lines
         .map(|r| {
             r.into_iter()
                 .enumerate()
-                .map(|(i, t)| if i == 0 { Cell::words(t) } else { Cell::number(t) })
+                .map(|(i, t)| if i == 0 { Cell::words(t) } else { Cell::number(t.replace(" to ", &between)) })
                 .collect()
         })
         .collect();
