@@ -222,10 +222,9 @@ impl OverKi {
         let count = |plant: usize| -> i32 {
             self.crossings.iter().filter(|c| c.0 == plant && c.1 < ki).map(|c| c.2).sum()
         };
-        (0..family.plants.len()).all(|plant| {
-            let known = !self.unknown.contains(&plant);
-            if known { count(plant) == 0 } else { family.is_one_stable(plant, lead, self.kp, ki) }
-        })
+        let counted = |plant: usize| self.unknown.contains(&plant) || count(plant) == 0;
+        // Crossings between two points are not counted: what is called stable is tested.
+        (0..family.plants.len()).all(counted) && family.is_stable(lead, self.kp, ki)
     }
 }
 
