@@ -1,14 +1,17 @@
 //! Every rule on the model in use, analysed; kept until model or free time constants change.
 
-use vasos_engine::analyze::{Analysis, StepFigures, analyze, step_figures};
+use vasos_engine::analyze::{Analysis, OpenLoop, StepFigures, analyze, step_figures};
 use vasos_engine::control::PidGains;
-use vasos_engine::document::{Document, ModelEntry, ModelOrigin, OptimumSettings};
+use vasos_engine::document::{Candidate, Document, ModelEntry, ModelOrigin, OptimumSettings};
 use vasos_engine::identify::ControllerFit;
 use vasos_engine::model::ProcessModel;
 use vasos_engine::tune::optimum::{
     Certificate, DerivativeFilter, Objective, Optimum, OptimumError, OptimumProblem, Process, Wanted, optimum,
 };
-use vasos_engine::tune::{ControllerKind, Rule, RuleError, RuleOptions, RuleWarning, registry};
+use vasos_engine::tune::{
+    ControllerKind, Rule, RuleError, RuleOptions, RuleWarning, SetpointSide, Ultimate, registry,
+    setpoint_side,
+};
 
 use crate::answers::{Answers, Question, Reply};
 use crate::{i18n, tr};
@@ -17,6 +20,9 @@ use crate::{i18n, tr};
 pub const PRESENT: &str = "present";
 /// Name of the rows of the best gains.
 pub const OPTIMAL: &str = "optimal";
+
+/// Name of the rows of gains that were made calmer by hand.
+pub const DETUNED: &str = "detuned";
 
 /// A row that gave gains.
 #[derive(Debug, Clone)]
@@ -93,6 +99,11 @@ pub struct TuningTable {
     pub refusals: Vec<Refusal>,
     /// What has to be worked out before the table is whole.
     pub questions: Vec<Question>,
+    /// Tunings whose curves stay beside the one in view, as the table has them.
+    pub compared: Vec<Row>,
+    /// Weight of the setpoint for the overshoot that is wanted, with the tuning in view; `None` where none is wanted.
+    pub setpoint: Option<Option<SetpointSide>>,
+    of_setpoint: Option<(ProcessModel, PidGains, f64)>,
     key: Option<Key>,
 }
 
@@ -103,6 +114,8 @@ struct Key {
     tau_c_s: Vec<(String, f64)>,
     present: Option<PidGains>,
     optimum: OptimumSettings,
+    ultimate: Option<Ultimate>,
+    by_hand: Vec<Candidate>,
     /// Which of the questions were answered.
     answered: [bool; 2],
 }
@@ -120,6 +133,7 @@ impl TuningTable {
         let questions = questions(&entry.model, &document.optimum);
         key.answered = questions.each_ref().map(|q| q.as_ref().is_some_and(|q| answers.find(q).is_some()));
         if self.key.as_ref() == Some(&key) {
+            self.follow(document);
             return;
         }
         let same_model = self.key.as_ref().is_some_and(|k| k.model == key.model);
@@ -128,6 +142,9 @@ impl TuningTable {
         self.refusals.clear();
         if let Some(gains) = key.present {
             self.rows.push(judged(&entry.model, &old, PRESENT, gains));
+        }
+        for by_hand in &key.by_hand {
+            self.rows.push(judged(&entry.model, &old, DETUNED, by_hand.gains));
         }
         self.questions.clear();
         for (kind, question) in [ControllerKind::Pi, ControllerKind::Pid].into_iter().zip(questions) {
@@ -147,13 +164,35 @@ impl TuningTable {
         }
         for rule in registry() {
             for &kind in rule.controllers {
-                let options =
-                    RuleOptions { tau_c_s: document.tau_c_s.get(rule.id).copied(), ..RuleOptions::default() };
+                let options = RuleOptions {
+                    tau_c_s: document.tau_c_s.get(rule.id).copied(),
+                    ultimate: key.ultimate,
+                    ..RuleOptions::default()
+                };
                 self.apply(&entry.model, &old, rule, kind, &options);
             }
         }
         self.model = Some(entry.model.clone());
         self.key = Some(key);
+        self.follow(document);
+    }
+
+    /// Brings in line what hangs on the tuning in view and on those compared.
+    fn follow(&mut self, document: &Document) {
+        let rows = &self.rows;
+        let same = |c: &Candidate| rows.iter().find(|r| r.rule == c.rule && r.kind.id() == c.controller);
+        self.compared = document.compared.iter().filter_map(same).cloned().collect();
+        let Some((model, percent)) = self.model.as_ref().zip(document.overshoot_percent) else {
+            (self.setpoint, self.of_setpoint) = (None, None);
+            return;
+        };
+        let in_view = document.candidate.as_ref().and_then(same).or(rows.first());
+        let Some(gains) = in_view.map(|r| r.gains) else { return };
+        let of = Some((model.clone(), gains, percent));
+        if self.of_setpoint != of {
+            self.setpoint = Some(setpoint_side(&OpenLoop::new(model, &gains), percent));
+            self.of_setpoint = of;
+        }
     }
 
     fn take_best(
@@ -235,7 +274,17 @@ fn key(document: &Document, entry: &ModelEntry, focus: usize) -> Key {
         }
         _ => present.filter(|_| same_units(document, entry, focus)),
     };
+    // Ku of a test on the rig is in the units of its loop.
+    let ultimate = document.ultimate.filter(|_| same_units(document, entry, focus));
+    let mut by_hand: Vec<Candidate> = vec![];
+    for one in document.candidate.iter().chain(&document.compared).filter(|c| c.rule == DETUNED) {
+        if !by_hand.iter().any(|known| known.controller == one.controller) {
+            by_hand.push(one.clone());
+        }
+    }
     Key {
+        ultimate,
+        by_hand,
         number: entry.number,
         model: entry.model.clone(),
         tau_c_s: document.tau_c_s.iter().map(|(k, v)| (k.clone(), *v)).collect(),

@@ -76,6 +76,28 @@ fn analyze_has_the_keys_of_the_spec_and_null_where_nothing_exists() {
     assert!(unstable["result"]["Ms"].is_null() && unstable["result"]["Ti_s"].is_null());
 }
 
+/// A PI had N 10 in one command and null in the other.
+#[test]
+fn a_pi_has_no_filter_in_any_command() {
+    let (analyzed, _) = json(&["analyze", "--model", MODEL, "--gains", "Kc=7,Ti=15", "--json"]);
+    let (tuned, _) = json(&["tune", "--model", MODEL, "--rule", "amigo", "--controller", "pi", "--json"]);
+    assert!(analyzed["result"]["N"].is_null() && tuned["results"][0]["N"].is_null());
+    let (pid, _) = json(&["analyze", "--model", MODEL, "--gains", "Kc=7,Ti=15,Td=1", "--json"]);
+    assert_eq!(pid["result"]["N"], 10.0);
+}
+
+/// A loop that never comes to rest in the time simulated had no IAE, and nothing said why.
+#[test]
+fn figures_that_are_missing_are_explained() {
+    let (slow, status) = json(&["analyze", "--model", MODEL, "--gains", "Kc=1e-12,Ti=15", "--json"]);
+    assert_eq!(status, 0);
+    let result = &slow["result"];
+    assert!(result["stable"] == true && result["iae_load"].is_null(), "{result}");
+    assert!(result["warnings"][0].as_str().expect("words").contains("do not come to rest"), "{result}");
+    let (fine, _) = json(&["analyze", "--model", MODEL, "--gains", "Kc=7,Ti=15", "--json"]);
+    assert_eq!(fine["result"]["warnings"], Value::Array(vec![]));
+}
+
 #[test]
 fn tune_gives_one_result_or_all_and_says_no_with_1() {
     let (whole, status) =

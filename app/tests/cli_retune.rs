@@ -205,6 +205,34 @@ fn same_log_same_bytes() {
 }
 
 #[test]
+fn a_report_is_written_in_portuguese_where_that_is_asked_for() {
+    let folder = scratch("portuguese");
+    let log = Loop::moved(1.0, 90.0).write(&folder.join("loop.csv"));
+    let report = folder.join("report.html");
+    let of = |language: &str| {
+        let output =
+            vasos(&["retune", &log, "--json", "--language", language, "-o", &report.display().to_string()]);
+        (output.stdout, output.status.code(), std::fs::read_to_string(&report).unwrap_or_default())
+    };
+    let (english, portuguese) = (of("en"), of("pt-BR"));
+    assert_eq!((english.1, portuguese.1), (Some(0), Some(0)));
+    assert_eq!(english.0, portuguese.0, "JSON is an interface, not a report");
+    assert!(portuguese.2.contains("lang=\"pt-BR\"") && english.2.contains("lang=\"en\""));
+    for (words, translated) in [
+        ("What to type into your controller", "O que digitar no seu controlador"),
+        ("Tunings compared", "Sintonias comparadas"),
+        ("Nyquist curves", "Curvas de Nyquist"),
+        ("use the optimal", "use o PI ótimo"),
+    ] {
+        let has = |html: &str, words: &str| html.to_lowercase().contains(&words.to_lowercase());
+        assert!(has(&english.2, words) && !has(&portuguese.2, words), "{words}");
+        assert!(has(&portuguese.2, translated) || words.starts_with("use"), "{translated}");
+    }
+    assert!(!portuguese.2.contains("retuning."), "a sentence without its translation");
+    assert_eq!(of("fr").1, Some(2));
+}
+
+#[test]
 fn hostile_names_stay_names() {
     let folder = scratch("hostile");
     let bad = Loop {

@@ -38,3 +38,14 @@ pub fn number(value: f64) -> String {
     let text = format!("{value:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
+
+/// Two numbers with as many digits as tell them apart, four at least.
+#[must_use]
+pub fn told_apart(a: f64, b: f64) -> [String; 2] {
+    let short = [number(a), number(b)];
+    if short[0] != short[1] || a == b || !(a.is_finite() && b.is_finite()) {
+        return short;
+    }
+    let with = |digits: usize| [a, b].map(|v| format!("{v:.digits$}"));
+    (4..16).map(with).find(|[a, b]| a != b).unwrap_or_else(|| [a, b].map(|v| format!("{v:e}")))
+}

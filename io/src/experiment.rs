@@ -60,6 +60,7 @@ pub const EXPERIMENTS: &[Embedded] = embedded![
     "uff_on_off",
     "fic18_tables",
     "fic18_figure_6",
+    "fic18_figure_9",
     "fic18_figure_10",
     "fic18_figure_11",
     "fic18_optimum",

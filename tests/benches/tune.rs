@@ -1,17 +1,21 @@
 //! What analysis and tuning cost: the full analysis of a loop, certified optima, the worst case over a family, a front
-//! with every rule on it.
+//! with every rule on it, and a retuning from the log on.
 
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use vasos_engine::analyze::{OpenLoop, analyze};
 use vasos_engine::control::PidGains;
+use vasos_engine::identify::{Drift, FitProblem, LoopRecord, StudyOptions, study_loop};
 use vasos_engine::model::{Fopdt, ProcessModel};
+use vasos_engine::retune::{LoopSigns, RetuneOptions, retune};
+use vasos_engine::signal::derived_column;
 use vasos_engine::tune::optimum::{
     DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, TradeOff, Wanted, front, on_front,
     optimum,
 };
 use vasos_engine::tune::{RuleOptions, tune_all};
+use vasos_io::log::{ImportOptions, ImportedLog, import_log};
 
 fn fopdt(k: f64, t: f64, l: f64) -> ProcessModel {
     ProcessModel::Fopdt(Fopdt::new(k, t, l).expect("a model"))
@@ -92,5 +96,55 @@ fn pareto_front(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, analysis, optima, worst_case, pareto_front);
+/// Rows of a first order, K = 2, T = 40 s, dead time 4 s, under PI with a moving setpoint, as CSV; a row a second.
+fn loop_log(rows: usize) -> String {
+    let decay = (-1.0f64 / 40.0).exp();
+    let (mut level, mut integral, mut state) = (0.0f64, 0.0, 7u64);
+    let mut arriving = [0.0; 4];
+    let mut text = "time_s,sp,pv,mv\n".to_owned();
+    for k in 0..rows {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let noise = 0.02 * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5);
+        let setpoint = f64::from(u8::from(k / 200 % 2 == 1));
+        let error = setpoint - (level + noise);
+        integral += 0.5 / 60.0 * error;
+        let mv = 0.5 * error + integral;
+        text.push_str(&format!("{k},{setpoint},{:.6},{mv:.6}\n", level + noise));
+        let arrives = 2.0 * std::mem::replace(&mut arriving[k % 4], mv);
+        level = arrives + (level - arrives) * decay;
+    }
+    text
+}
+
+/// What `vasos retune` does for a log of 10⁴ rows, but for the report: reading, the study, the tuning. The study alone
+/// stands beside it.
+fn retuning(c: &mut Criterion) {
+    let csv = loop_log(10_000);
+    let read = || import_log("loop.csv", csv.as_bytes(), &ImportOptions::default()).expect("a log");
+    let columns =
+        |log: &ImportedLog| ["pv", "mv", "sp"].map(|n| derived_column(&log.table, n).expect("a column"));
+    let study = |log: &ImportedLog, [pv, mv, sp]: &[Vec<f64>; 3]| {
+        let mut problem = FitProblem::new(&log.table.time_s, pv, mv);
+        problem.options.drift = Drift::Auto;
+        let record = LoopRecord { problem, sp: Some(sp), mode: None };
+        study_loop(&record, &StudyOptions::default()).expect("a study")
+    };
+    let mut group = c.benchmark_group("retune_10_000_rows");
+    group.sample_size(20);
+    group.bench_function("whole", |b| {
+        b.iter(|| {
+            let log = read();
+            let columns = columns(&log);
+            let study = study(&log, &columns);
+            let signs = LoopSigns::of(&log.table.time_s, &columns[1], Some(&columns[2]));
+            retune(&study, &signs, &RetuneOptions::default()).expect("an answer")
+        });
+    });
+    let log = read();
+    let columns = columns(&log);
+    group.bench_function("study", |b| b.iter(|| study(&log, &columns)));
+    group.finish();
+}
+
+criterion_group!(benches, analysis, optima, worst_case, pareto_front, retuning);
 criterion_main!(benches);

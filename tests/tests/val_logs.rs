@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use vasos_engine::identify::{
     Disturbance, Drift, FitProblem, LoopRecord, LoopStudy, ModeColumn, StudyOptions, study_loop,
 };
+use vasos_engine::retune::{LoopSigns, RetuneOptions, retune};
 use vasos_engine::signal::derived_column;
 use vasos_io::log::{ImportOptions, import_log};
 use vasos_tests::{root, skip};
@@ -61,6 +62,11 @@ fn cases() -> Vec<Case> {
 
 /// The study of a case with the names of its PV and MV, or why there is none.
 fn study(folder: &Path, case: &Case) -> Result<(String, LoopStudy), String> {
+    study_with_signs(folder, case).map(|(columns, study, _)| (columns, study))
+}
+
+/// The same with what a retuning needs of the signals.
+fn study_with_signs(folder: &Path, case: &Case) -> Result<(String, LoopStudy, LoopSigns), String> {
     let bytes = std::fs::read(folder.join(case.file)).expect("a log");
     let name =
         Path::new(case.file).file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -101,7 +107,8 @@ fn study(folder: &Path, case: &Case) -> Result<(String, LoopStudy), String> {
     let mode = mode.as_deref().map(|values| ModeColumn { values, words });
     let record = LoopRecord { problem, sp: sp.as_deref(), mode };
     let study = study_loop(&record, &StudyOptions::default()).map_err(|e| e.to_string())?;
-    Ok((format!("{pv_name} from {mv_name}"), study))
+    let signs = LoopSigns::of(&rows.time_s, &rows.columns[1], sp.as_deref());
+    Ok((format!("{pv_name} from {mv_name}"), study, signs))
 }
 
 /// Three digits: the table is to change when what it says does, not with the last bits.
@@ -164,15 +171,58 @@ fn val_logs_of_real_plants_say_what_the_table_keeps() {
     };
     let table: String =
         cases().iter().map(|case| row(case, &study(&folder, case))).collect::<Vec<_>>().join("\n");
-    let path = root().join("tests/tests/val_logs/table.txt");
+    compare_with_kept(&table, "table.txt");
+}
+
+fn compare_with_kept(table: &str, file: &str) {
+    let path = root().join("tests/tests/val_logs").join(file);
     if std::env::var_os("UPDATE_LOGS").is_some() {
-        std::fs::write(&path, &table).expect("written");
+        std::fs::write(&path, table).expect("written");
     }
     let kept = std::fs::read_to_string(&path).expect("the table");
     for (new, old) in table.lines().zip(kept.lines()) {
         assert_eq!(new, old, "a line of {} has changed", path.display());
     }
     assert_eq!(table.lines().count(), kept.lines().count());
+}
+
+/// What a retuning of each log comes to: the tuning with its gains and what it is worth, or the reasoned no.
+///
+/// Kept in val_logs/retune.txt. What must hold of any of them: gains that are recommended keep Ms 1.4 with the model, or are
+/// the present ones.
+#[test]
+fn val_retuning_of_real_loops_says_what_the_table_keeps() {
+    let Some(folder) = folder() else {
+        return skip("val_retuning_of_real_loops_says_what_the_table_keeps", "no VASOS_TEST_DATA");
+    };
+    let mut table = String::new();
+    for case in cases() {
+        writeln!(table, "{}", case.file).expect("text");
+        let (columns, study, signs) = match study_with_signs(&folder, &case) {
+            Ok(found) => found,
+            Err(reason) => {
+                writeln!(table, "  no: {reason}").expect("text");
+                continue;
+            }
+        };
+        let found = retune(&study, &signs, &RetuneOptions::default()).expect("limits that can be asked for");
+        writeln!(table, "  {columns}").expect("text");
+        if let Some(choice) = found.choice() {
+            let g = choice.gains;
+            let ms = choice.analysis.ms.expect("a stable loop");
+            let kept =
+                choice.rule.id() == "present" || ms <= 1.4 * (1.0 + 1e-6) || found.candidates.len() < 2;
+            assert!(kept || choice.rule.id() == "optimal_family", "{}: Ms {ms}", case.file);
+            let two = |v: f64| format!("{v:.1e}");
+            let name = format!("{} {}", choice.rule.id(), choice.controller);
+            writeln!(table, "  {name}: Kp {} Ki {} Ms {}", two(g.kp), two(g.ki), three(ms)).expect("text");
+        }
+        for advice in &found.advice {
+            let said = advice.to_string();
+            writeln!(table, "  {}", said.split([':', ';']).next().unwrap_or("")).expect("text");
+        }
+    }
+    compare_with_kept(&table, "retune.txt");
 }
 
 fn model_of(folder: &Path, file: &'static str, case: Case) -> LoopStudy {

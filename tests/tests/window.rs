@@ -619,3 +619,67 @@ fn the_best_gains_follow_their_limits_and_every_view_shows_them() {
     }
     results.extend_harness(&mut harness);
 }
+
+/// Several tunings side by side, one made calmer by hand, with a weight of the setpoint for a wanted overshoot, and rules that
+/// start from the Ku and Pu of a test.
+#[test]
+fn tunings_are_overlaid_made_calmer_and_given_a_setpoint_weight() {
+    let mut results = egui_kittest::SnapshotResults::new();
+    let mut harness = window([1440.0, 900.0]);
+    act(&mut harness, typed_model());
+    harness.run_steps(3);
+    let row = |h: &Window, rule: &str| h.state().tuning().find(rule, "pi").expect("a row").clone();
+    let view = |h: &mut Window, rule: &str| {
+        let gains = row(h, rule).gains;
+        let candidate = Candidate { rule: rule.to_owned(), controller: "pi".to_owned(), gains };
+        act(h, Action::Document(DocumentCommand::Candidate(Some(candidate))));
+        h.run_steps(2);
+    };
+    for rule in ["optimal", "amigo", "itae_load"] {
+        view(&mut harness, rule);
+        harness.get_by_label("Overlay").click();
+        harness.run_steps(2);
+    }
+    assert_eq!(harness.state().tuning().compared.len(), 3);
+    harness.get_by_label("Overlay").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().tuning().compared.len(), 2, "a second press takes it out");
+    harness.get_by_label("Calmer").click();
+    harness.run_steps(3);
+    let calmer = row(&harness, "detuned").gains;
+    assert!((calmer.kc / row(&harness, "itae_load").gains.kc - 0.8).abs() < 1e-12, "{calmer:?}");
+    harness.get_by_label("Setpoint …").click();
+    harness.run_steps(3);
+    let check_box = eframe::egui::accesskit::Role::CheckBox;
+    harness.get_by_role_and_label(check_box, "Choose b for an overshoot of").click();
+    harness.run_steps(3);
+    let wanted = harness.state().document().overshoot_percent;
+    let side = harness.state().tuning().setpoint.flatten();
+    let side = side.unwrap_or_else(|| panic!("no weight for {wanted:?}"));
+    assert!(side.b < 1.0 && (side.overshoot_percent - 5.0).abs() < 0.1, "{side:?}");
+    harness.remove_cursor();
+    picture(&mut harness, "tunings_setpoint_menu");
+    harness.key_press(eframe::egui::Key::Escape);
+    harness.run_steps(3);
+    harness.get_by_label_contains("Apply to LIC-02").click();
+    harness.run_steps(3);
+    let loop_now = harness.state().document().rig.loops["LIC-02"].tuning;
+    assert_eq!((loop_now.gains, loop_now.b), (calmer, side.b), "the weight goes with the gains");
+    let of_model = row(&harness, "zn_closed_loop").gains;
+    let measured = vasos_engine::tune::Ultimate { ku: 20.0, pu_s: 12.0 };
+    act(&mut harness, Action::Document(DocumentCommand::Ultimate(Some(measured))));
+    harness.run_steps(3);
+    let of_test = row(&harness, "zn_closed_loop").gains;
+    assert!((of_test.kc - 9.0).abs() < 1e-12 && (of_test.ti_s - 10.0).abs() < 1e-12, "{of_test:?}");
+    harness.remove_cursor();
+    picture(&mut harness, "tunings_overlaid_1440x900");
+    harness.get_by_label("Those of the model").click();
+    harness.run_steps(3);
+    assert_eq!(row(&harness, "zn_closed_loop").gains, of_model);
+    harness.set_size(eframe::egui::vec2(1280.0, 720.0));
+    act(&mut harness, Action::ToggleTheme);
+    harness.run_steps(3);
+    harness.remove_cursor();
+    picture(&mut harness, "tunings_overlaid_1280x720_light");
+    results.extend_harness(&mut harness);
+}

@@ -1,7 +1,7 @@
 //! `vasos analyze`: what a controller is worth on a model.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{StepFigures, analyze, analyze_measured, step_figures};
+use vasos_engine::analyze::{Analysis, StepFigures, analyze, analyze_measured, step_figures};
 use vasos_engine::control::ParallelGains;
 use vasos_engine::tune::ControllerKind;
 use vasos_io::frequency_response::read_frequency_response;
@@ -46,12 +46,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
         }
         (None, None) => return Err(Refusal("give --model or --response".to_owned())),
     };
+    let remarks = remarks(&analysis, &figures, arguments.model.is_some());
     if arguments.json {
         let mut result = Map::new();
         json::add_gains(&mut result, ControllerKind::of(&gains), Some(&gains));
         json::add_analysis(&mut result, &analysis);
         json::add_figures(&mut result, &analysis, &figures);
-        json::add_remarks(&mut result, true, &[]);
+        json::add_remarks(&mut result, true, &remarks);
         let whole = json!({"model": described, "result": Value::Object(result)});
         return Ok(Answer::done(json::text(&whole)));
     }
@@ -78,5 +79,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
             vec![if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }, shown(value)]
         }))
         .collect();
-    Ok(Answer::done(table(&rows)))
+    Ok(Answer::done(format!("{}{}", table(&rows), remarks.join("\n"))))
+}
+
+/// Why figures of the step responses are missing where they could be expected.
+fn remarks(analysis: &Analysis, figures: &StepFigures, simulated: bool) -> Vec<String> {
+    let missing = figures.iae_load.is_none() || figures.iae_setpoint.is_none();
+    if !(analysis.stable && simulated && missing) {
+        return vec![];
+    }
+    vec![
+        "the step responses do not come to rest at the setpoint in the time that is simulated, so they have no IAE: the loop is too slow for its model, or has no integral action"
+            .to_owned(),
+    ]
 }

@@ -47,7 +47,8 @@ pub fn add_gains(to: &mut Map<String, Value>, kind: ControllerKind, gains: Optio
         ("Kc", with(|g| g.kc)),
         ("Ti_s", with(|g| g.ti_s)),
         ("Td_s", with(|g| g.td_s)),
-        ("N", with(|g| g.n)),
+        // Without derivative action there is no filter.
+        ("N", gains.filter(|g| g.td_s != 0.0).map(|g| g.n)),
         ("Ki", with(PidGains::ki)),
         ("Kd", with(PidGains::kd)),
     ] {

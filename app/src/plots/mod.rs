@@ -127,6 +127,27 @@ fn marks(bounds: (f64, f64), step_size: f64) -> Vec<GridMark> {
     (0..=count).map(|i| GridMark { value: (first + i as f64) * step_size, step_size }).collect()
 }
 
+/// Names of overlaid curves in their colours, in as many rows as they need: inside a plot they would lie over the curves.
+pub fn legend(
+    ui: &mut eframe::egui::Ui,
+    own: &str,
+    colour: eframe::egui::Color32,
+    others: &[(String, eframe::egui::Color32)],
+) {
+    ui.scope(|ui| {
+        // Rows of words, not of buttons.
+        ui.spacing_mut().interact_size.y = crate::theme::SMALL + 2.0;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = eframe::egui::vec2(8.0, 0.0);
+            let own = std::iter::once((own, colour));
+            for (name, colour) in own.chain(others.iter().map(|(name, colour)| (name.as_str(), *colour))) {
+                let words = eframe::egui::RichText::new(format!("— {name}"));
+                ui.add(eframe::egui::Label::new(words.size(crate::theme::SMALL).color(colour)).extend());
+            }
+        });
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

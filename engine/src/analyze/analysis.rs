@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::OpenLoop;
 use super::grid::Grid;
-use super::stability::{GainCrossing, angle_to_critical, gain_crossings, is_stable};
+use super::stability::{GainCrossing, angle_to_critical, gain_crossings, is_stable, unstable_poles};
 use super::sweep::{PhaseCrossing, S, Sweep, T, U, V};
 use crate::control::PidGains;
 use crate::model::ProcessModel;
@@ -98,6 +98,11 @@ pub fn analyze_loop(open: &OpenLoop) -> Analysis {
 #[must_use]
 pub fn is_loop_stable(open: &OpenLoop) -> bool {
     is_stable(open, &gain_crossings(open))
+}
+
+/// How many poles of the closed loop are unstable; `None` where one is on the verge, or they are without end.
+pub(crate) fn unstable_loop_poles(open: &OpenLoop) -> Option<u32> {
+    unstable_poles(open, &gain_crossings(open))
 }
 
 /// Whether the closed loop is stable: the verdict of [`analyze`] alone, a few hundred nanoseconds.

@@ -67,6 +67,18 @@ pub enum FrequencyResponseError {
         /// The last frequency in rad/s.
         omega_rad_s: f64,
     },
+    /// The response ends before half a turn of lag, so that no gain can be told from one too large.
+    #[error(
+        "the frequency response ends at {} rad/s with a phase of {}°: which gains stabilise cannot be told before −180°; measure to a higher frequency",
+        number(*.omega_rad_s),
+        number(*.phase_deg)
+    )]
+    BeforeHalfTurn {
+        /// The last frequency in rad/s.
+        omega_rad_s: f64,
+        /// Phase there in degrees, of the process with its gain taken positive.
+        phase_deg: f64,
+    },
 }
 
 impl FrequencyResponseError {
@@ -77,6 +89,7 @@ impl FrequencyResponseError {
             Self::TooFew { count: 2 },
             Self::Point { index: 3, omega_rad_s: 0.1 },
             Self::TooShort { gain: 1.2, omega_rad_s: 0.3 },
+            Self::BeforeHalfTurn { omega_rad_s: 0.3, phase_deg: -120.0 },
         ]
     }
 }
@@ -87,6 +100,7 @@ impl Explain for FrequencyResponseError {
             Self::TooFew { .. } => "frequency_response.too_few",
             Self::Point { .. } => "frequency_response.point",
             Self::TooShort { .. } => "frequency_response.too_short",
+            Self::BeforeHalfTurn { .. } => "frequency_response.before_half_turn",
         }
     }
 
@@ -99,11 +113,30 @@ impl Explain for FrequencyResponseError {
             Self::TooShort { gain, omega_rad_s } => {
                 vec![("gain", number(*gain)), ("omega", number(*omega_rad_s))]
             }
+            Self::BeforeHalfTurn { omega_rad_s, phase_deg } => {
+                vec![("omega", number(*omega_rad_s)), ("phase", number(*phase_deg))]
+            }
         }
     }
 }
 
 impl FrequencyResponse {
+    /// Whether the response reaches half a turn of lag, without which no gain can be called too large.
+    ///
+    /// # Errors
+    /// [`FrequencyResponseError::BeforeHalfTurn`] where it ends before.
+    pub(crate) fn reaches_half_turn(&self) -> Result<(), FrequencyResponseError> {
+        let negative = if self.low.coefficient < 0.0 { PI } else { 0.0 };
+        let phase = |rad: &f64| rad - negative;
+        let least = self.phase_rad.iter().map(phase).fold(f64::INFINITY, f64::min);
+        let last = self.phase_rad.last().map_or(0.0, phase);
+        if least > -PI {
+            let (omega_rad_s, phase_deg) = (self.last_omega(), last.to_degrees());
+            return Err(FrequencyResponseError::BeforeHalfTurn { omega_rad_s, phase_deg });
+        }
+        Ok(())
+    }
+
     /// Takes points (ω in rad/s, G(jω) in PV units per MV unit).
     ///
     /// # Errors

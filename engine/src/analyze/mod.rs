@@ -16,6 +16,7 @@ mod search;
 mod stability;
 mod sweep;
 
+pub(crate) use analysis::unstable_loop_poles;
 pub use analysis::{
     Analysis, Peak, Peaks, analyze, analyze_loop, is_closed_loop_stable, is_loop_stable, peaks,
 };

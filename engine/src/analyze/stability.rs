@@ -88,6 +88,11 @@ fn squared_magnitude(p: &[f64], unit: f64) -> Vec<f64> {
 
 /// Whether every closed-loop pole lies in the open left half-plane.
 pub(super) fn is_stable(open: &OpenLoop, crossings: &[GainCrossing]) -> bool {
+    unstable_poles(open, crossings) == Some(0)
+}
+
+/// Closed-loop poles in the right half-plane; `None` where one lies on its edge, or they are without end.
+pub(super) fn unstable_poles(open: &OpenLoop, crossings: &[GainCrossing]) -> Option<u32> {
     let l_at_infinity = open.process_high() * open.controller_high();
     let leading = if open.num.len() == open.den.len() { open.num[0] } else { 0.0 };
     let degenerate = if open.dead_time_s > 0.0 {
@@ -103,11 +108,11 @@ pub(super) fn is_stable(open: &OpenLoop, crossings: &[GainCrossing]) -> bool {
         distance.is_nan() || distance <= ON_THE_CRITICAL_POINT
     };
     if !finite || degenerate || at_origin || crossings.iter().any(on_critical_point) {
-        return false;
+        return None;
     }
     let turns = winding(open, crossings) / FRAC_PI_2;
     let degree = (open.den.len() - 1) as f64;
-    (degree - turns).abs() < 0.5
+    Some((0.5 * (degree - turns)).round().max(0.0) as u32)
 }
 
 /// Change of arg F(jω) from ω = 0 to ∞ in radians: π/2 times (degree − 2 × unstable closed-loop poles).

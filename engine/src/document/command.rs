@@ -6,14 +6,17 @@ use super::data::{
     Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
     RigSettings, SourceChoice, Stretch,
 };
+use super::error::DocumentError;
 use crate::control::{GainsError, Law, LoopOptions, LoopSpec, Mode, PidTuning, check_filter, check_loop};
-use crate::explain::{Explain, number};
 use crate::identify::{LoopStudy, ModelFit};
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network, RigError};
 use crate::session::{CommandError, RecordedRun};
 use crate::signal::LogTable;
-use crate::tune::optimum::OptimumError;
+use crate::tune::Ultimate;
+
+/// Tunings compared at a time: more curves than these cannot be told apart.
+const MOST_COMPARED: usize = 4;
 
 /// A change of the document.
 #[derive(Debug, Clone)]
@@ -64,6 +67,12 @@ pub enum DocumentCommand {
     TauC(String, Option<f64>),
     /// Objective and limits of the best gains.
     Optimum(OptimumSettings),
+    /// The curves of a tuning stay beside the one in view, or no longer do.
+    Compare(Candidate),
+    /// Overshoot of a setpoint step in percent for which b is chosen; `None` for none.
+    Overshoot(Option<f64>),
+    /// Ku and Pu of a test for the rules that start from them; `None` for those of the model.
+    Ultimate(Option<Ultimate>),
 }
 
 /// A model that joins the list.
@@ -83,64 +92,6 @@ pub struct NewModel {
     pub pv_unit: String,
     /// Unit of its MV.
     pub mv_unit: String,
-}
-
-/// Why the document stays as it is.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DocumentError {
-    /// The rig could not take it.
-    #[error(transparent)]
-    Command(#[from] CommandError),
-    /// PV and MV on one column.
-    #[error("PV and MV cannot be the same column; choose another one for either")]
-    SameColumn,
-    /// A stretch without length.
-    #[error("a stretch from {} s to {} s is empty; drag over a part of the trend", number(*.from_s), number(*.to_s))]
-    EmptyStretch {
-        /// Start in seconds.
-        from_s: f64,
-        /// End in seconds.
-        to_s: f64,
-    },
-    /// A free time constant that is not positive.
-    #[error("τc = {} s is not usable: it must be greater than 0", number(*.value))]
-    TauC {
-        /// Offending value in seconds.
-        value: f64,
-    },
-    /// Limits that cannot be used.
-    #[error(transparent)]
-    Optimum(OptimumError),
-}
-
-impl Explain for DocumentError {
-    fn key(&self) -> &'static str {
-        match self {
-            Self::Command(error) => error.key(),
-            Self::SameColumn => "document.same_column",
-            Self::EmptyStretch { .. } => "document.empty_stretch",
-            Self::TauC { .. } => "document.tau_c",
-            Self::Optimum(error) => error.key(),
-        }
-    }
-
-    fn args(&self) -> Vec<(&'static str, String)> {
-        match self {
-            Self::Command(error) => error.args(),
-            Self::SameColumn => vec![],
-            Self::EmptyStretch { from_s, to_s } => vec![("from_s", number(*from_s)), ("to_s", number(*to_s))],
-            Self::TauC { value } => vec![("value", number(*value))],
-            Self::Optimum(error) => error.args(),
-        }
-    }
-}
-
-impl DocumentError {
-    /// One of each kind of its own, for the test that compares them with the translation files.
-    #[must_use]
-    pub fn samples() -> Vec<Self> {
-        vec![Self::SameColumn, Self::EmptyStretch { from_s: 5.0, to_s: 5.0 }, Self::TauC { value: -1.0 }]
-    }
 }
 
 impl DocumentCommand {
@@ -170,6 +121,9 @@ impl DocumentCommand {
             Self::Candidate(_) => "candidate",
             Self::TauC(..) => "tau_c",
             Self::Optimum(_) => "optimum",
+            Self::Compare(_) => "compare",
+            Self::Overshoot(_) => "overshoot",
+            Self::Ultimate(_) => "ultimate",
         }
     }
 
@@ -202,7 +156,9 @@ impl DocumentCommand {
             | Self::Law(tag, _)
             | Self::Options(tag, _)
             | Self::PvFilter(tag, _) => Some(format!("{} {tag}", self.key())),
-            Self::Stretch(_) | Self::Candidate(_) | Self::Optimum(_) => Some(self.key().to_owned()),
+            Self::Stretch(_) | Self::Candidate(_) | Self::Optimum(_) | Self::Overshoot(_) => {
+                Some(self.key().to_owned())
+            }
             _ => None,
         }
     }
@@ -278,22 +234,59 @@ impl Document {
                     next.model_in_use = next.models.last().map(|m| m.number);
                 }
             }
-            DocumentCommand::Candidate(candidate) => next.candidate.clone_from(candidate),
+            DocumentCommand::Candidate(_)
+            | DocumentCommand::TauC(..)
+            | DocumentCommand::Optimum(_)
+            | DocumentCommand::Compare(_)
+            | DocumentCommand::Overshoot(_)
+            | DocumentCommand::Ultimate(_) => next.change_tuning(command)?,
+        }
+        Ok(next)
+    }
+
+    /// Carries out a command about what is tuned for and looked at; others change nothing.
+    fn change_tuning(&mut self, command: &DocumentCommand) -> Result<(), DocumentError> {
+        match command {
+            DocumentCommand::Candidate(candidate) => self.candidate.clone_from(candidate),
             DocumentCommand::TauC(rule, Some(value)) => {
                 if !(value.is_finite() && *value > 0.0) {
                     return Err(DocumentError::TauC { value: *value });
                 }
-                next.tau_c_s.insert(rule.clone(), *value);
+                self.tau_c_s.insert(rule.clone(), *value);
             }
             DocumentCommand::Optimum(settings) => {
                 settings.limits.validated().map_err(DocumentError::Optimum)?;
-                next.optimum = *settings;
+                self.optimum = *settings;
+            }
+            DocumentCommand::Compare(candidate) => self.compare(candidate),
+            DocumentCommand::Overshoot(percent) => {
+                if let Some(value) = percent.filter(|v| !(0.0..=100.0).contains(v)) {
+                    return Err(DocumentError::Overshoot { value });
+                }
+                self.overshoot_percent = *percent;
+            }
+            DocumentCommand::Ultimate(ultimate) => {
+                self.ultimate =
+                    ultimate.map(Ultimate::validated).transpose().map_err(DocumentError::Ultimate)?;
             }
             DocumentCommand::TauC(rule, None) => {
-                next.tau_c_s.remove(rule);
+                self.tau_c_s.remove(rule);
             }
+            _ => {}
         }
-        Ok(next)
+        Ok(())
+    }
+
+    /// Takes a tuning in among those compared, the oldest making room, or out again.
+    fn compare(&mut self, candidate: &Candidate) {
+        if self.compared.contains(candidate) {
+            self.compared.retain(|c| c != candidate);
+            return;
+        }
+        if self.compared.len() >= MOST_COMPARED {
+            self.compared.remove(0);
+        }
+        self.compared.push(candidate.clone());
     }
 
     fn open_recording(&mut self, run: &Arc<RecordedRun>) {
@@ -408,5 +401,6 @@ impl Document {
         self.models.push(ModelEntry { number, model, origin, fit, study, rows, pv_unit, mv_unit });
         self.model_in_use = Some(number);
         self.candidate = None;
+        self.compared.clear();
     }
 }

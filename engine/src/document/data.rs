@@ -9,6 +9,7 @@ use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
 use crate::session::{RecordedRun, Rig};
 use crate::signal::LogTable;
+use crate::tune::Ultimate;
 use crate::tune::optimum::{LoopLimits, Objective};
 
 /// Settings of one loop.
@@ -286,6 +287,12 @@ pub struct Document {
     pub tau_c_s: BTreeMap<String, f64>,
     /// Objective and limits of the best gains.
     pub optimum: OptimumSettings,
+    /// Tunings whose curves stay beside the one in view.
+    pub compared: Vec<Candidate>,
+    /// Overshoot of a setpoint step for which b is chosen, in percent; `None` leaves b as it is.
+    pub overshoot_percent: Option<f64>,
+    /// Ku and Pu of a test, in units of the rig's loop, for the rules that start from them; `None`: those of the model.
+    pub ultimate: Option<Ultimate>,
 }
 
 impl Document {
@@ -304,6 +311,9 @@ impl Document {
             candidate: None,
             tau_c_s: BTreeMap::new(),
             optimum: OptimumSettings::default(),
+            compared: vec![],
+            overshoot_percent: None,
+            ultimate: None,
         }
     }
 

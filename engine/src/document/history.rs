@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::command::{DocumentCommand, DocumentError};
+use super::command::DocumentCommand;
 use super::data::Document;
+use super::error::DocumentError;
 
 /// Versions kept for undo.
 const MOST_VERSIONS: usize = 500;

@@ -6,13 +6,15 @@
 
 mod command;
 mod data;
+mod error;
 mod history;
 mod sync;
 
-pub use command::{DocumentCommand, DocumentError, NewModel};
+pub use command::{DocumentCommand, NewModel};
 pub use data::{
     Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
     RigSettings, SourceChoice, Stretch,
 };
+pub use error::DocumentError;
 pub use history::History;
 pub use sync::{Consequence, rig_commands};

@@ -1,63 +1,18 @@
 //! Candidates, and which of them to use.
 
 use super::advice::Advice;
+use super::best::{best, is_robust};
 use super::candidate::{Candidate, CandidateRule, parallel, published};
-use super::family::{family, with_dead_time};
+use super::family::with_dead_time;
 use super::options::{LoopSigns, RetuneOptions};
+use super::remarks::remarks_on_choice;
+use super::retuning::{Retuning, gain};
 use super::swing::{Swing, is_its_own, passes, swing};
-use crate::identify::{LoopStudy, ModelFit};
+use crate::control::PidGains;
+use crate::identify::LoopStudy;
 use crate::model::ProcessModel;
 use crate::tune::ControllerKind;
-use crate::tune::optimum::{Objective, OptimumError, OptimumProblem, Process, Wanted, optimum};
-
-/// What comes of a retuning.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Retuning {
-    /// Model that was tuned for; absent where the log gives none.
-    pub model: Option<ProcessModel>,
-    /// Models drawn from what the log leaves open; none where it leaves a parameter open altogether.
-    pub draws: Vec<ProcessModel>,
-    /// Tunings, the best first, the present one last.
-    pub candidates: Vec<Candidate>,
-    /// Which of them to use; absent where none should be.
-    pub recommended: Option<usize>,
-    /// The answer first, then what goes with it.
-    pub advice: Vec<Advice>,
-}
-
-impl Retuning {
-    /// The tuning to use.
-    #[must_use]
-    pub fn choice(&self) -> Option<&Candidate> {
-        self.candidates.get(self.recommended?)
-    }
-
-    /// The present tuning.
-    #[must_use]
-    pub fn present(&self) -> Option<&Candidate> {
-        self.candidates.iter().find(|c| c.rule == CandidateRule::Present)
-    }
-
-    /// How much smaller the IAE of a load step becomes, in percent of the present one; Jv where an IAE does not exist.
-    /// Negative where the present tuning is faster. `None` without a stable present tuning with integral action.
-    #[must_use]
-    pub fn gain(&self) -> Option<(&'static str, f64)> {
-        gain(self.choice()?, self.present()?)
-    }
-
-    fn none(advice: Advice) -> Self {
-        Self { advice: vec![advice], ..Self::default() }
-    }
-}
-
-fn gain(new: &Candidate, old: &Candidate) -> Option<(&'static str, f64)> {
-    let percent = |new: Option<f64>, old: Option<f64>| {
-        new.zip(old).filter(|(_, old)| *old > 0.0).map(|(new, old)| 100.0 * (1.0 - new / old))
-    };
-    percent(new.figures.iae_load, old.figures.iae_load)
-        .map(|p| ("iae_load", p))
-        .or_else(|| percent(new.analysis.jv, old.analysis.jv).map(|p| ("Jv", p)))
-}
+use crate::tune::optimum::OptimumError;
 
 /// Tunes for the model of a study, compares, and chooses.
 ///
@@ -115,11 +70,7 @@ fn without_model(swing: Option<Swing>, reason: Advice) -> Retuning {
 /// Least share of its own moves that a controller read from a log must explain.
 const READ_WELL: f64 = 0.5;
 
-fn present_gains(
-    study: &LoopStudy,
-    options: &RetuneOptions,
-    remarks: &mut Vec<Advice>,
-) -> Option<crate::control::PidGains> {
+fn present_gains(study: &LoopStudy, options: &RetuneOptions, remarks: &mut Vec<Advice>) -> Option<PidGains> {
     if options.present.is_some() {
         return options.present;
     }
@@ -129,77 +80,6 @@ fn present_gains(
         return None;
     }
     controller.gains()
-}
-
-/// Share of unstable loops and 95 % quantile of Ms from which the optimum of the model alone is not to be used.
-const MOST_UNSTABLE: f64 = 0.01;
-const MOST_MS: f64 = 2.0;
-
-fn is_robust(candidate: &Candidate, limit_ms: f64) -> bool {
-    // A user who asks for Ms over 2 does not mind an Ms over 2.
-    let most = MOST_MS.max(1.2 * if limit_ms.is_finite() { limit_ms } else { 1.0 });
-    candidate.spread.as_ref().is_none_or(|s| s.unstable_share() <= MOST_UNSTABLE && s.ms.high <= most)
-}
-
-/// Adds the optima; which of them to use, or why there is none.
-fn best(
-    model: &ProcessModel,
-    options: &RetuneOptions,
-    out: &mut Retuning,
-) -> Result<Result<usize, Advice>, OptimumError> {
-    let pid = options.controller == ControllerKind::Pid;
-    let mut kinds = vec![ControllerKind::Pi];
-    if pid {
-        kinds.insert(0, ControllerKind::Pid);
-    }
-    let mut answer = None;
-    for kind in kinds {
-        let found = best_of(model, kind, options, out)?;
-        // The controller that was asked for first; the other only where there is none.
-        if answer.as_ref().is_none_or(Result::is_err) {
-            answer = Some(found);
-        }
-    }
-    Ok(answer.unwrap_or(Err(Advice::TooUncertain)))
-}
-
-fn best_of(
-    model: &ProcessModel,
-    kind: ControllerKind,
-    options: &RetuneOptions,
-    out: &mut Retuning,
-) -> Result<Result<usize, Advice>, OptimumError> {
-    let nominal = match solve(&[Process::Model(model.clone())], kind, options) {
-        Ok(gains) => gains,
-        Err(error) if error.is_answer() => return Ok(Err(Advice::NoOptimum(error))),
-        Err(error) => return Err(error),
-    };
-    let candidate = Candidate::new(CandidateRule::Optimal, kind, nominal, model, &out.draws);
-    let robust = is_robust(&candidate, options.limits.ms);
-    let spread = candidate.spread.clone();
-    out.candidates.push(candidate);
-    if robust {
-        return Ok(Ok(out.candidates.len() - 1));
-    }
-    let (unstable_percent, ms) =
-        spread.map_or((0.0, f64::INFINITY), |s| (100.0 * s.unstable_share(), s.ms.high));
-    out.advice.push(Advice::Uncertain { controller: kind, unstable_percent, ms });
-    let family = family(model, &out.draws, &nominal);
-    let Ok(gains) = solve(&family, kind, options) else { return Ok(Err(Advice::TooUncertain)) };
-    let candidate = Candidate::new(CandidateRule::OptimalFamily, kind, gains, model, &out.draws);
-    let robust = is_robust(&candidate, options.limits.ms);
-    out.candidates.push(candidate);
-    Ok(if robust { Ok(out.candidates.len() - 1) } else { Err(Advice::TooUncertain) })
-}
-
-fn solve(
-    processes: &[Process],
-    kind: ControllerKind,
-    options: &RetuneOptions,
-) -> Result<crate::control::ParallelGains, OptimumError> {
-    let wanted = if kind == ControllerKind::Pid { Wanted::pid(&options.limits) } else { Wanted::Pi };
-    let problem = OptimumProblem { processes, wanted, objective: Objective::Jv, limits: options.limits };
-    optimum(&problem).map(|found| found.gains)
 }
 
 /// Gain in percent under which a change is not worth its risk.
@@ -275,40 +155,9 @@ fn keeps(candidate: &Candidate, options: &RetuneOptions) -> bool {
         .all(|(value, limit)| limit.is_infinite() || value.is_some_and(|v| v <= NEAR * limit))
 }
 
-/// What to know before the numbers are typed in.
-fn remarks_on_choice(out: &Retuning, fit: &ModelFit, signs: &LoopSigns) -> Vec<Advice> {
-    /// Change of Kc that is better made in steps.
-    const LARGE: f64 = 4.0;
-    /// Share of the MV's range in the log that noise may move it by.
-    const RESTLESS: f64 = 0.1;
-    let mut remarks = Vec::new();
-    let Some(choice) = out.choice() else { return remarks };
-    if choice.rule == CandidateRule::Present {
-        return remarks;
-    }
-    if choice.gains.kp == 0.0 {
-        remarks.push(Advice::IntegratorOnly);
-    }
-    if let Some(present) = out.present() {
-        let factor = choice.gains.kp / present.gains.kp;
-        if factor > LARGE || (factor > 0.0 && factor < 1.0 / LARGE) {
-            remarks.push(Advice::LargeMove { factor });
-        }
-    }
-    // What neighbours share is slow, and the integral takes care of it: the rest is noise.
-    let shared = fit.tests.autocorrelation.first().copied().unwrap_or(0.0).clamp(0.0, 1.0);
-    let noise = (fit.mse * (1.0 - shared)).sqrt();
-    let moved = 2.0 * choice.analysis.ju.unwrap_or(choice.gains.kp.abs()) * noise;
-    if moved > RESTLESS * signs.mv_range && signs.mv_range > 0.0 {
-        remarks.push(Advice::Restless { mv_move: moved, percent: 100.0 * moved / signs.mv_range });
-    }
-    remarks
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::PidGains;
     use crate::identify::{FitProblem, LoopRecord, StudyOptions, study_loop};
     use crate::tune::optimum::LoopLimits;
 

@@ -7,13 +7,17 @@
 //! place. Same study, same options, same numbers.
 
 mod advice;
+mod best;
 mod candidate;
 mod decide;
 mod family;
 mod options;
+mod remarks;
+mod retuning;
 mod swing;
 
 pub use advice::Advice;
 pub use candidate::{Candidate, CandidateRule};
-pub use decide::{Retuning, retune};
+pub use decide::retune;
 pub use options::{LoopSigns, RetuneOptions};
+pub use retuning::Retuning;

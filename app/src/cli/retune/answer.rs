@@ -13,6 +13,7 @@ use super::Task;
 use super::one::Outcome;
 use crate::cli::identify;
 use crate::cli::json::{self, shown, table};
+use crate::tr;
 
 pub(super) fn json(outcome: &Outcome, task: &Task) -> String {
     json::text(&value(outcome, task))
@@ -47,8 +48,8 @@ pub(super) fn value(outcome: &Outcome, task: &Task) -> Value {
         "reason": outcome.reason(),
         "gain_percent": gain.map(|g| g.1),
         "gain_measure": gain.map(|g| g.0),
-        "warnings": outcome.warnings,
-        "repairs": outcome.repairs,
+        "warnings": outcome.warnings(),
+        "repairs": outcome.repairs(),
     })
 }
 
@@ -118,27 +119,33 @@ pub(super) fn action(gains: &PidGains) -> &'static str {
 /// Name of a candidate for people.
 pub(super) fn title(one: &Candidate) -> String {
     match one.rule.id() {
-        "optimal_family" => format!("optimal {}, worst of 12", one.controller),
+        "optimal_family" => tr!("retuning.optimal_family", controller = one.controller),
+        "optimal" => tr!("retuning.optimal", controller = one.controller),
+        "present" => tr!("retuning.present_one", controller = one.controller),
+        // The rules go by the names that the command line knows.
         id => format!("{id} {}", one.controller),
     }
 }
 
-/// Kc, Ti, Td and what they are worth, in the order of the table's head.
-pub(super) const HEAD: [&str; 12] = [
-    "tuning",
-    "Kc",
-    "Ti (s)",
-    "Td (s)",
-    "Ms",
-    "Mt",
-    "Ju",
-    "Jv",
-    "IAE load",
-    "IAE setpoint",
-    "overshoot (%)",
-    "unstable (%)",
-];
+/// Head of the table of [`row`].
+pub(super) fn head() -> [String; 12] {
+    [
+        tr!("retuning.tuning"),
+        "Kc".to_owned(),
+        "Ti (s)".to_owned(),
+        "Td (s)".to_owned(),
+        "Ms".to_owned(),
+        "Mt".to_owned(),
+        "Ju".to_owned(),
+        "Jv".to_owned(),
+        tr!("retuning.iae_load"),
+        tr!("retuning.iae_setpoint"),
+        tr!("retuning.overshoot"),
+        tr!("retuning.unstable"),
+    ]
+}
 
+/// Kc, Ti, Td and what they are worth, in the order of the table's head.
 pub(super) fn row(one: &Candidate) -> Vec<String> {
     let Analysis { ms, mt, ju, jv, .. } = one.analysis;
     let ideal = one.ideal();
@@ -168,7 +175,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
         out.push_str(&format!("{}\n\n", choice.chosen().verdict()));
     }
     if !retuning.candidates.is_empty() {
-        let mut rows = vec![HEAD.map(str::to_owned).to_vec()];
+        let mut rows = vec![head().to_vec()];
         rows.extend(retuning.candidates.iter().enumerate().map(|(place, one)| {
             let mut row = row(one);
             if retuning.recommended == Some(place) {
@@ -183,7 +190,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
         let way = if percent < 0.0 { "more" } else { "less" };
         out.push_str(&format!("{name} against the present tuning: {} % {way}\n", number(percent.abs())));
     }
-    for line in outcome.warnings.iter().chain(&outcome.repairs) {
+    for line in outcome.warnings().iter().chain(&outcome.repairs()) {
         out.push_str(&format!("note: {line}\n"));
     }
     out

@@ -14,6 +14,7 @@ use vasos_io::report::{Axis, Chart, Ink, Mark};
 
 use super::answer::title;
 use super::one::Outcome;
+use crate::tr;
 
 fn zipped(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     x.iter().copied().zip(y.iter().copied()).collect()
@@ -26,19 +27,23 @@ pub(super) fn data(outcome: &Outcome) -> Vec<Chart> {
     let fit: Option<&ModelFit> = outcome.study.choice.as_ref().ok().map(|c| c.chosen());
     let time = &rows.time_s;
     let axis = || match (time.first(), time.last()) {
-        (Some(first), Some(last)) if last > first => Axis::between("time (s)", *first, *last),
-        _ => Axis::fitting("time (s)"),
+        (Some(first), Some(last)) if last > first => Axis::between(tr!("retuning.time"), *first, *last),
+        _ => Axis::fitting(tr!("retuning.time")),
     };
     let mut marks = vec![Mark::line(format!("PV {}", columns.pv), zipped(time, &rows.columns[0]), Ink::Data)];
     if let (Some(sp), Some(name)) = (&stretch.sp, &columns.sp) {
-        marks.push(Mark::line(format!("setpoint {name}"), zipped(time, sp), Ink::Present));
+        marks.push(Mark::line(
+            format!("{} {name}", tr!("retuning.setpoint")),
+            zipped(time, sp),
+            Ink::Present,
+        ));
     }
     if let Some(fit) = fit.filter(|_| outcome.study.has_model()) {
-        marks.push(Mark::line("model, free run", zipped(time, &fit.simulated), Ink::First));
+        marks.push(Mark::line(tr!("retuning.free_run"), zipped(time, &fit.simulated), Ink::First));
     }
-    let upper = Chart::wide("Process variable and model", axis(), Axis::fitting(columns.pv.as_str()), marks);
+    let upper = Chart::wide(tr!("retuning.chart_pv"), axis(), Axis::fitting(columns.pv.as_str()), marks);
     let mv = vec![Mark::line(format!("MV {}", columns.mv), zipped(time, &rows.columns[1]), Ink::Third)];
-    let mut lower = Chart::wide("Manipulated variable", axis(), Axis::fitting(columns.mv.as_str()), mv);
+    let mut lower = Chart::wide(tr!("retuning.chart_mv"), axis(), Axis::fitting(columns.mv.as_str()), mv);
     lower.height = 110.0;
     vec![upper, lower]
 }
@@ -88,9 +93,9 @@ fn horizon_s(model: &ProcessModel, retuning: &Retuning) -> f64 {
 /// Setpoint and load steps: PV and MV of each.
 pub(super) fn steps(model: &ProcessModel, retuning: &Retuning) -> Vec<Chart> {
     let horizon_s = horizon_s(model, retuning);
-    [(Excitation::Setpoint, "setpoint step of 1"), (Excitation::Load, "load step of 1 at the MV")]
+    [(Excitation::Setpoint, tr!("retuning.setpoint_step")), (Excitation::Load, tr!("retuning.load_step"))]
         .into_iter()
-        .flat_map(|(excitation, name)| step(model, retuning, excitation, name, horizon_s))
+        .flat_map(|(excitation, name)| step(model, retuning, excitation, &name, horizon_s))
         .collect()
 }
 
@@ -108,7 +113,7 @@ fn step(
         retuning.choice().and_then(|c| tuning_spread(&retuning.draws, &c.gains, excitation, horizon_s));
     let band = |of: fn(&TuningSpread) -> &Vec<[f64; 3]>| {
         spread.as_ref().map(|s| Mark::Band {
-            name: Some("90 % of the models".to_owned()),
+            name: Some(tr!("retuning.models_90")),
             points: s.time_s.iter().zip(of(s)).map(|(t, b)| (*t, b[0], b[2])).collect(),
             ink: Ink::First,
         })
@@ -120,7 +125,7 @@ fn step(
         pv.push(Mark::line(title(one), zipped(&response.time_s, &response.y), ink));
         mv.push(Mark::line(title(one), zipped(&response.time_s, &response.u), ink));
     }
-    let time = || Axis::between("time (s)", 0.0, horizon_s);
+    let time = || Axis::between(tr!("retuning.time"), 0.0, horizon_s);
     let fitted = |label: String, marks: &[Mark]| match stable_range(retuning, marks) {
         Some((low, high)) => Axis::between(label, low, high),
         None => Axis::fitting(label),
@@ -169,7 +174,7 @@ pub(super) fn nyquist(model: &ProcessModel, retuning: &Retuning, limits: &LoopLi
     marks.push(Mark::Point { label: "−1".to_owned(), x: -1.0, y: 0.0, ink: Ink::Limit });
     // Equal lengths on both axes, so that the circle is one.
     let mut chart = Chart::half(
-        "Nyquist curves",
+        tr!("retuning.nyquist"),
         Axis::between("Re L", -2.2, 0.6),
         Axis::between("Im L", -2.2, 0.6),
         marks,
@@ -194,7 +199,7 @@ pub(super) fn trade_off(
         return None;
     }
     let curve: Vec<(f64, f64)> = points.iter().filter_map(|p| Some((p.analysis.ms?, p.value))).collect();
-    let mut marks = vec![Mark::line(format!("best {kind} there is"), curve, Ink::Data)];
+    let mut marks = vec![Mark::line(tr!("retuning.best", controller = kind), curve, Ink::Data)];
     for (one, ink) in inked(retuning) {
         let open = OpenLoop::of_parallel(model, &one.gains);
         if let Some((ms, jv)) = on_front(&open, &one.analysis, TradeOff::JvMs) {
@@ -202,9 +207,9 @@ pub(super) fn trade_off(
         }
     }
     let mut chart = Chart::half(
-        "Trade-off",
-        Axis::fitting("Ms (smaller is more robust)"),
-        Axis::log("Jv (smaller is better)"),
+        tr!("retuning.trade_off"),
+        Axis::fitting(tr!("retuning.ms_axis")),
+        Axis::log(tr!("retuning.jv_axis")),
         marks,
     );
     chart.height = chart.width - 72.0;

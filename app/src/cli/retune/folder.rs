@@ -12,6 +12,8 @@ use super::one::Outcome;
 use super::{Arguments, Task, answer, output, report};
 use crate::cli::json::{self, shown, table};
 use crate::cli::{Answer, Refusal};
+use crate::i18n::{self, Language};
+use crate::tr;
 
 /// Endings that logs have.
 const ENDINGS: [&str; 10] = ["csv", "tsv", "txt", "dat", "log", "xlsx", "xls", "ods", "parquet", "rrd"];
@@ -54,6 +56,8 @@ struct Line {
     /// Tuning to use, in words.
     tuning: Option<String>,
     reason: String,
+    /// The same in the language of the reports.
+    said: String,
     sticks: bool,
     swings: bool,
     /// Whole answer; absent for a file that cannot be read.
@@ -153,6 +157,7 @@ fn line(path: &Path, task: &Task, with_report: bool) -> Line {
                 gain_percent: retuning.gain().map(|g| g.1),
                 tuning: retuning.choice().map(answer::title),
                 reason: outcome.reason(),
+                said: report::in_its_language(task, || outcome.reason()),
                 sticks: oscillation.is_some_and(|o| o.sticks()),
                 swings: oscillation.is_some_and(|o| o.regularity > 1.0),
                 whole: Some(answer::value(&outcome, task)),
@@ -162,6 +167,7 @@ fn line(path: &Path, task: &Task, with_report: bool) -> Line {
         Err(Refusal(reason)) => Line {
             // The folder is named already, and must not tell answers apart.
             reason: reason.replace(&path.display().to_string(), &name),
+            said: reason.replace(&path.display().to_string(), &name),
             name,
             verdict: Verdict::Unreadable,
             gain_percent: None,
@@ -227,6 +233,13 @@ fn report_name(log: &str) -> String {
 }
 
 fn overview(arguments: &Arguments, lines: &[Line], with_links: bool) -> Report {
+    i18n::set(arguments.language);
+    let report = in_language(arguments, lines, with_links);
+    i18n::set(Language::English);
+    report
+}
+
+fn in_language(arguments: &Arguments, lines: &[Line], with_links: bool) -> Report {
     let rows = lines.iter().map(|l| {
         let name = if with_links && l.html.is_some() {
             Cell::link(&l.name, report_name(&l.name))
@@ -235,36 +248,32 @@ fn overview(arguments: &Arguments, lines: &[Line], with_links: bool) -> Report {
         };
         vec![
             name,
-            Cell::words(l.verdict.id().replace('_', " ")),
+            Cell::words(tr!(&format!("retuning.verdict_{}", l.verdict.id()))),
             Cell::number(shown(l.gain_percent)),
-            Cell::words(l.reason.clone()),
+            Cell::words(l.said.clone()),
         ]
     });
-    let head = ["log", "verdict", "gain (%)", "reason"].map(str::to_owned).to_vec();
+    let head =
+        vec![tr!("retuning.log"), tr!("retuning.verdict"), tr!("retuning.gain"), tr!("retuning.reason")];
     let sticking = lines.iter().filter(|l| l.sticks).count();
     let swinging = lines.iter().filter(|l| l.swings && !l.sticks).count();
     let mut blocks = Vec::new();
     if sticking + swinging > 0 {
-        blocks.push(Block::Note(
-            Tone::Warning,
-            format!("{sticking} loops swing as behind a sticking valve, {swinging} others swing."),
-        ));
+        blocks
+            .push(Block::Note(Tone::Warning, tr!("retuning.swings", sticking = sticking, others = swinging)));
     }
     blocks.push(Block::Table(Table { head, rows: rows.collect(), marked: None }));
-    blocks.push(Block::Paragraph(
-        "Gain: how much smaller the IAE of a load step becomes against the present tuning, or Jv where an IAE does not exist."
-            .to_owned(),
-    ));
+    blocks.push(Block::Paragraph(tr!("retuning.gain_note")));
     let folder = arguments.log.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let provenance = [
-        ("Folder", folder.clone()),
-        ("Logs", lines.len().to_string()),
-        ("Program", format!("Vasos {}", env!("CARGO_PKG_VERSION"))),
+        (tr!("retuning.folder"), folder.clone()),
+        (tr!("retuning.logs"), lines.len().to_string()),
+        (tr!("retuning.program"), format!("Vasos {}", env!("CARGO_PKG_VERSION"))),
     ];
     Report {
-        language: "en",
-        title: format!("Retuning of {folder}"),
-        provenance: provenance.map(|(name, value)| (name.to_owned(), value)).to_vec(),
+        language: arguments.language.tag(),
+        title: tr!("retuning.title", name = folder),
+        provenance: provenance.to_vec(),
         blocks,
     }
 }

@@ -15,6 +15,7 @@ use vasos_engine::tune::optimum::LoopLimits;
 
 use super::log_columns::LogArguments;
 use super::{Answer, Refusal, parse, tune};
+use crate::i18n::Language;
 
 /// Arguments of `vasos retune`.
 #[derive(Debug, clap::Args)]
@@ -25,6 +26,7 @@ Examples:
   vasos retune loop.csv --pv h2_cm --mv u_v --sp sp --from 100 --to 900 --controller pid
   vasos retune loop.csv --ms 1.6 --ju 20 --pv-span 100 --mv-span 100
   vasos retune logs/ --jobs 4 -o reports/
+  vasos retune loop.csv --language pt-BR -o report.html
 Identifies the process, tunes for it and compares: the best tuning under the limits, two published rules, and the
 present tuning as --present gives it or the log shows it, each on 200 models that fit the log as well.
 A folder gives a table of all its logs (text, workbooks, Parquet, recordings), those that gain most first; with -o a report for each
@@ -62,15 +64,28 @@ pub struct Arguments {
     /// Report to write, HTML; for a folder the folder of the reports, or an HTML file for the table.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Language of the report: en or pt-BR.
+    #[arg(long, value_name = "TAG", default_value = "en", value_parser = language)]
+    language: Language,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+fn language(tag: &str) -> Result<Language, String> {
+    let known = || Language::ALL.map(Language::tag).join(", ");
+    Language::ALL
+        .into_iter()
+        .find(|l| l.tag().eq_ignore_ascii_case(tag))
+        .ok_or_else(|| format!("there is no language '{tag}': choose one of {}", known()))
 }
 
 /// What is asked of every log, checked.
 struct Task<'a> {
     columns: &'a LogArguments,
     options: RetuneOptions,
+    /// Of the reports.
+    language: Language,
     /// Spans of MV and PV.
     spans: Option<(f64, f64)>,
 }
@@ -119,5 +134,5 @@ fn task(arguments: &Arguments) -> Result<Task<'_>, Refusal> {
         return Err(Refusal("--jobs 0 would never end: give 1 or more".to_owned()));
     }
     let options = RetuneOptions { controller, limits, present, ..RetuneOptions::default() };
-    Ok(Task { columns: &arguments.columns, options, spans })
+    Ok(Task { columns: &arguments.columns, language: arguments.language, options, spans })
 }

@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
+use vasos_engine::explain::Explain;
 use vasos_engine::identify::{LoopStudy, study_loop};
-use vasos_engine::retune::{Advice, LoopSigns, Retuning, retune};
+use vasos_engine::retune::{LoopSigns, Retuning, retune};
 use vasos_io::log::sha256_of_file;
 
 use super::{Arguments, Task, answer, output, report};
 use crate::cli::log_columns::LoadedLog;
 use crate::cli::{Answer, Refusal};
+use crate::{i18n, tr};
 
 /// All that came of one log.
 pub(super) struct Outcome {
@@ -18,10 +20,6 @@ pub(super) struct Outcome {
     pub log: LoadedLog,
     pub study: LoopStudy,
     pub retuning: Retuning,
-    /// Everything to heed, the most important first; not the answer itself.
-    pub warnings: Vec<String>,
-    /// What was done to the file's text.
-    pub repairs: Vec<String>,
 }
 
 impl Outcome {
@@ -33,22 +31,36 @@ impl Outcome {
         let retuning = retune(&study, &signs, &task.options).map_err(Refusal::of)?;
         drop(record);
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        let mut warnings: Vec<String> = retuning.advice.iter().skip(1).map(ToString::to_string).collect();
-        warnings.extend(study.findings.iter().filter(|f| f.is_warning()).map(ToString::to_string));
-        if let (Ok(choice), true) = (&study.choice, study.has_model()) {
-            let objections = choice.chosen().verdicts.iter().filter(|v| v.is_objection());
-            warnings.extend(objections.map(ToString::to_string));
-        }
-        warnings.extend(log.warnings());
-        let repairs = log.imported.report.repairs.iter().map(ToString::to_string).collect();
         let sha256 = sha256_of_file(path)
             .map_err(|error| Refusal(format!("{} cannot be read: {error}", path.display())))?;
-        Ok(Self { name, sha256, log, study, retuning, warnings, repairs })
+        Ok(Self { name, sha256, log, study, retuning })
     }
 
-    /// The answer in words.
+    /// The answer in words of the present language.
     pub fn reason(&self) -> String {
-        self.retuning.advice.first().map_or_else(String::new, Advice::to_string)
+        self.retuning.advice.first().map_or_else(String::new, |advice| i18n::say(advice))
+    }
+
+    /// Everything to heed, the most important first; not the answer itself.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut said: Vec<&dyn Explain> = Vec::new();
+        said.extend(self.retuning.advice.iter().skip(1).map(|a| a as &dyn Explain));
+        said.extend(self.study.findings.iter().filter(|f| f.is_warning()).map(|f| f as &dyn Explain));
+        if let (Ok(choice), true) = (&self.study.choice, self.study.has_model()) {
+            let objections = choice.chosen().verdicts.iter().filter(|v| v.is_objection());
+            said.extend(objections.map(|v| v as &dyn Explain));
+        }
+        let mut warnings: Vec<String> = said.into_iter().map(i18n::say).collect();
+        let left_out = self.log.stretch.rows.left_out.len();
+        if left_out > 0 {
+            warnings.push(tr!("retuning.left_out", rows = left_out));
+        }
+        warnings
+    }
+
+    /// What was done to the file's text.
+    pub fn repairs(&self) -> Vec<String> {
+        self.log.imported.report.repairs.iter().map(|repair| i18n::say(repair)).collect()
     }
 }
 

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use eframe::egui::{self, RichText};
-use vasos_engine::document::SourceChoice;
+use vasos_engine::document::{DocumentCommand, SourceChoice};
 use vasos_engine::excitation::{
     AtRest, Ending, Excitation, ExcitationLimits, ExcitationReport, Finding, Relay, Signal, StepEnd,
     SteppedSine, UltimateGain,
 };
 use vasos_engine::explain::Explain;
 use vasos_engine::session::RigCommand;
+use vasos_engine::tune::Ultimate;
 
 use crate::action::Action;
 use crate::panes::View;
@@ -161,7 +162,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, bench: &mut Bench, actions: &mut Vec<A
             }
         });
         if let Some(report) = &bench.report {
-            result(ui, report, &unit);
+            result(ui, report, &unit, actions);
         }
     });
 }
@@ -256,7 +257,7 @@ fn settings(ui: &mut egui::Ui, bench: &mut Bench, unit: &str) {
 }
 
 /// What the last test measured.
-fn result(ui: &mut egui::Ui, report: &ExcitationReport, unit: &str) {
+fn result(ui: &mut egui::Ui, report: &ExcitationReport, unit: &str, actions: &mut Vec<Action>) {
     let p = theme::palette(ui);
     let mut say = |words: String, colour| {
         ui.add(egui::Label::new(RichText::new(words).color(colour)).wrap());
@@ -306,5 +307,15 @@ fn result(ui: &mut egui::Ui, report: &ExcitationReport, unit: &str) {
     for warning in report.warnings() {
         let words: &dyn Explain = &warning;
         say(format!("! {}", i18n::say(words)), p.caution);
+    }
+    let measured = match &report.finding {
+        Finding::Relay(relay) => Some(Ultimate { ku: relay.ku, pu_s: relay.period_s }),
+        Finding::Ultimate(found) => Some(Ultimate { ku: found.ku, pu_s: found.pu_s }),
+        _ => None,
+    };
+    if let Some(measured) = measured
+        && ui.button(tr!("test.use_ultimate")).on_hover_text(tr!("test.use_ultimate_hint")).clicked()
+    {
+        actions.push(Action::Document(DocumentCommand::Ultimate(Some(measured))));
     }
 }

@@ -14,7 +14,7 @@ use vasos_engine::tune::optimum::LoopLimits;
 
 use crate::action::Action;
 use crate::panes::View;
-use crate::panes::tune::row_in_view;
+use crate::panes::tune::{row_in_view, title};
 use crate::tuning::{PRESENT, Row};
 use crate::{plots, text, theme, tr};
 
@@ -72,16 +72,33 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
             });
         figures(ui, row);
     });
-    let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
+    let others = others(ui, view, row);
+    if !view.tuning.compared.is_empty() && state.shown != 4 {
+        let names: Vec<(String, egui::Color32)> = others.iter().map(|o| (o.0.clone(), o.1)).collect();
+        plots::legend(ui, &title(row), theme::palette(ui).pv, &names);
+    }
     match state.shown {
-        0 => return nyquist(ui, view, state, model, row, present),
+        0 => return nyquist(ui, view, state, model, row, &others),
         4 => pole_map::ui(ui, model, row),
         shown => {
-            let tunings = over_frequency::Tunings { model, row, present };
+            let tunings = over_frequency::Tunings { model, row, others: &others };
             over_frequency::ui(ui, shown, &tunings, &mut state.curves);
         }
     }
     vec![]
+}
+
+/// A tuning whose curves stand beside the one in view, with its name and colour.
+type Other<'a> = (String, egui::Color32, &'a Row);
+
+/// The tuning in use, and those that are compared.
+fn others<'a>(ui: &egui::Ui, view: &View<'a>, row: &Row) -> Vec<Other<'a>> {
+    let p = theme::palette(ui);
+    let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
+    let compared = view.tuning.compared.iter().enumerate();
+    let compared = compared.filter(|(_, r)| r.gains != row.gains && r.rule != PRESENT);
+    let present = present.map(|r| (tr!("rules.present"), p.ghost, r));
+    present.into_iter().chain(compared.map(|(k, r)| (title(r), theme::series(&p, k + 1), r))).collect()
 }
 
 /// The Nyquist curve.
@@ -91,12 +108,14 @@ fn nyquist(
     state: &mut State,
     model: &ProcessModel,
     row: &Row,
-    present: Option<&Row>,
+    others: &[Other<'_>],
 ) -> Vec<Action> {
     let p = theme::palette(ui);
     let curve = state.curve(model, &row.gains);
-    let ghost = present.map(|r| state.curve(model, &r.gains));
-    let names = [tr!("nyquist.loop"), tr!("rules.present")];
+    let beside: Vec<(String, egui::Color32, Vec<[f64; 3]>)> = others
+        .iter()
+        .map(|(name, colour, r)| (name.clone(), *colour, state.curve(model, &r.gains)))
+        .collect();
     let hover = curve.clone();
     let ellipses = uncertainty(view, model, &row.gains, &curve);
     let limit = view.document.optimum.limits.ms;
@@ -135,8 +154,8 @@ fn nyquist(
         .show(ui, |plot| {
             circles(plot, row, &p);
             limit_circle(plot, limit, &p);
-            if let Some(ghost) = ghost {
-                plot.line(Line::new(names[1].clone(), plane(&ghost)).color(p.ghost).width(1.2));
+            for (name, colour, curve) in &beside {
+                plot.line(Line::new(name.clone(), plane(curve)).color(*colour).width(1.2));
             }
             for ellipse in &ellipses {
                 let fill = Polygon::new(tr!("nyquist.band"), PlotPoints::from(ellipse.clone()));
@@ -146,7 +165,7 @@ fn nyquist(
                         .allow_hover(false),
                 );
             }
-            plot.line(Line::new(names[0].clone(), plane(&curve)).color(p.pv).width(theme::LINE));
+            plot.line(Line::new(tr!("nyquist.loop"), plane(&curve)).color(p.pv).width(theme::LINE));
             plot.points(Points::new("−1", vec![[-1.0, 0.0]]).radius(4.5).color(p.alarm));
             let label = RichText::new("−1").color(p.text).size(theme::BODY);
             plot.text(Text::new("", PlotPoint::new(-1.0, 0.16), label));
@@ -239,9 +258,8 @@ fn plane(curve: &[[f64; 3]]) -> PlotPoints<'static> {
 
 fn figures(ui: &mut egui::Ui, row: &Row) {
     let a = &row.analysis;
-    let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
     {
-        ui.label(RichText::new(format!("{title} · {}", row.kind)).family(theme::bold()));
+        ui.label(RichText::new(title(row)).family(theme::bold()));
         let p = theme::palette(ui);
         let words = if a.stable {
             tr!(

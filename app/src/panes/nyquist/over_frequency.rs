@@ -14,7 +14,8 @@ use crate::{plots, text, theme, tr};
 pub(super) struct Tunings<'a> {
     pub model: &'a ProcessModel,
     pub row: &'a Row,
-    pub present: Option<&'a Row>,
+    /// Those beside it, with name and colour.
+    pub others: &'a [super::Other<'a>],
 }
 
 /// Curves of loops, kept until model or gains change.
@@ -62,12 +63,27 @@ impl State {
 /// Draws one of the views: 1 Bode, 2 Nichols, 3 gang of four.
 pub(super) fn ui(ui: &mut egui::Ui, shown: usize, tunings: &Tunings<'_>, state: &mut State) {
     let curves = state.curves(tunings.model, &tunings.row.gains);
-    let ghost = tunings.present.map(|r| state.curves(tunings.model, &r.gains));
+    let others: Vec<Beside> = tunings
+        .others
+        .iter()
+        .map(|(name, colour, row)| Beside {
+            name: name.clone(),
+            colour: *colour,
+            curves: state.curves(tunings.model, &row.gains),
+        })
+        .collect();
     match shown {
-        1 => bode(ui, &curves, ghost.as_ref()),
-        2 => nichols(ui, &curves, ghost.as_ref()),
-        _ => gang_of_four(ui, &curves, ghost.as_ref()),
+        1 => bode(ui, &curves, &others),
+        2 => nichols(ui, &curves, &others),
+        _ => gang_of_four(ui, &curves, &others),
     }
+}
+
+/// Curves of another tuning.
+struct Beside {
+    name: String,
+    colour: egui::Color32,
+    curves: Curves,
 }
 
 fn decibel(v: Complex64) -> f64 {
@@ -108,10 +124,9 @@ fn at_pointer(
     }
 }
 
-fn bode(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
+fn bode(ui: &mut egui::Ui, curves: &Curves, others: &[Beside]) {
     let p = theme::palette(ui);
     let height = 0.5 * ui.available_height() - 4.0;
-    let names = (tr!("nyquist.loop"), tr!("rules.present"));
     for part in 0..2 {
         let of = |c: &Curves| -> Vec<[f64; 2]> {
             if part == 0 {
@@ -146,15 +161,15 @@ fn bode(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
                 plot.hline(
                     HLine::new("", critical).color(p.alarm).width(1.0).style(LineStyle::dashed_dense()),
                 );
-                if let Some(ghost) = ghost {
-                    plot.line(line(of(ghost), names.1.clone(), p.ghost, 1.2));
+                for other in others {
+                    plot.line(line(of(&other.curves), other.name.clone(), other.colour, 1.2));
                 }
-                plot.line(line(points, names.0.clone(), p.pv, theme::LINE));
+                plot.line(line(points, tr!("nyquist.loop"), p.pv, theme::LINE));
             });
     }
 }
 
-fn nichols(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
+fn nichols(ui: &mut egui::Ui, curves: &Curves, others: &[Beside]) {
     let p = theme::palette(ui);
     let of = |c: &Curves| -> Vec<[f64; 2]> {
         c.open.iter().zip(phases_deg(&c.open)).map(|((_, v), a)| [a, decibel(*v)]).collect()
@@ -176,15 +191,15 @@ fn nichols(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
         .grid_color(p.grid)
         .label_formatter(formatter)
         .show(ui, |plot| {
-            if let Some(ghost) = ghost {
-                plot.line(line(of(ghost), tr!("rules.present"), p.ghost, 1.2));
+            for other in others {
+                plot.line(line(of(&other.curves), other.name.clone(), other.colour, 1.2));
             }
             plot.line(line(points, tr!("nyquist.loop"), p.pv, theme::LINE));
             plot.points(Points::new("−1", vec![[-180.0, 0.0]]).radius(4.5).color(p.alarm));
         });
 }
 
-fn gang_of_four(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
+fn gang_of_four(ui: &mut egui::Ui, curves: &Curves, others: &[Beside]) {
     let p = theme::palette(ui);
     let height = (0.5 * ui.available_height() - 4.0).max(50.0);
     let width = 0.5 * ui.available_width() - 4.0;
@@ -215,8 +230,8 @@ fn gang_of_four(ui: &mut egui::Ui, curves: &Curves, ghost: Option<&Curves>) {
                     .grid_color(p.grid)
                     .label_formatter(formatter)
                     .show(ui, |plot| {
-                        if let Some(ghost) = ghost {
-                            plot.line(line(of(ghost), tr!("rules.present"), p.ghost, 1.2));
+                        for other in others {
+                            plot.line(line(of(&other.curves), other.name.clone(), other.colour, 1.2));
                         }
                         plot.line(line(points, name.to_owned(), p.pv, theme::LINE));
                     });

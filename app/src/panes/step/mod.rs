@@ -13,7 +13,7 @@ use vasos_engine::tune::TuningSpread;
 use crate::action::Action;
 use crate::answers::{Question, Reply};
 use crate::panes::View;
-use crate::panes::tune::row_in_view;
+use crate::panes::tune::{row_in_view, title};
 use crate::tuning::{PRESENT, Row};
 use crate::widgets::segmented;
 use crate::{plots, text, theme, tr};
@@ -32,6 +32,7 @@ struct Cached {
     model: ProcessModel,
     gains: PidGains,
     load: bool,
+    b: f64,
     horizon_s: Option<f64>,
     response: std::rc::Rc<Response>,
 }
@@ -41,25 +42,27 @@ impl State {
         &mut self,
         model: &ProcessModel,
         gains: &PidGains,
+        b: f64,
         horizon_s: Option<f64>,
     ) -> std::rc::Rc<Response> {
         let load = self.load;
         let same = |c: &&Cached| {
-            c.model == *model && c.gains == *gains && c.load == load && c.horizon_s == horizon_s
+            c.model == *model && c.gains == *gains && c.load == load && c.b == b && c.horizon_s == horizon_s
         };
         if let Some(known) = self.cached.iter().find(same) {
             return known.response.clone();
         }
         let excitation = if load { Excitation::Load } else { Excitation::Setpoint };
-        let options = ResponseOptions { horizon_s, ..ResponseOptions::default() };
+        let options = ResponseOptions { horizon_s, setpoint_weight_b: b, ..ResponseOptions::default() };
         let response = std::rc::Rc::new(step_response(model, gains, excitation, &options));
-        if self.cached.len() >= 12 {
+        if self.cached.len() >= 16 {
             self.cached.remove(0);
         }
         self.cached.push(Cached {
             model: model.clone(),
             gains: *gains,
             load,
+            b,
             horizon_s,
             response: response.clone(),
         });
@@ -89,20 +92,36 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     if state.rig {
         return on_rig::ui(ui, view, row);
     }
-    let first = state.response(model, &row.gains, None);
+    let b = view.tuning.setpoint.flatten().map_or(1.0, |side| side.b);
+    let first = state.response(model, &row.gains, b, None);
     let settling = first.metrics().ok().and_then(|m| m.settling_time_s);
     let horizon_s = settling.filter(|s| *s > 0.0).map(|s| 1.8 * s);
-    let response = state.response(model, &row.gains, horizon_s);
+    let response = state.response(model, &row.gains, b, horizon_s);
     let shown_s = response.time_s.last().copied();
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
-    let ghost = present.map(|r| state.response(model, &r.gains, shown_s));
+    let mut others: Vec<(String, egui::Color32, std::rc::Rc<Response>)> = vec![];
+    let p = theme::palette(ui);
+    let overlaid = view.tuning.compared.iter().enumerate().filter(|(_, r)| r.gains != row.gains);
+    if let Some(present) = present {
+        others.push((tr!("rules.present"), p.ghost, state.response(model, &present.gains, 1.0, shown_s)));
+    }
+    for (k, other) in overlaid.filter(|(_, r)| r.rule != PRESENT) {
+        let response = state.response(model, &other.gains, 1.0, shown_s);
+        others.push((title(other), theme::series(&p, k + 1), response));
+    }
     let (band, actions) = band(view, state, model, row, shown_s);
+    let names: Vec<(String, egui::Color32)> = others.iter().map(|(n, c, _)| (n.clone(), *c)).collect();
+    // The tuning in use alone, in grey, needs no names.
+    if !view.tuning.compared.is_empty() {
+        plots::legend(ui, &title(row), p.pv, &names);
+    }
     let height = ui.available_height() - if band.is_some() { 52.0 } else { 36.0 };
     let units = view
         .document
         .model()
         .map_or((String::new(), String::new()), |e| (e.pv_unit.clone(), e.mv_unit.clone()));
-    let drawn = Drawn { response: &response, ghost: ghost.as_deref(), band: band.as_ref() };
+    let legend = !view.tuning.compared.is_empty();
+    let drawn = Drawn { response: &response, others: &others, legend, band: band.as_ref() };
     curves(ui, true, 0.58 * height, &drawn, &units, state.load);
     curves(ui, false, 0.42 * height, &drawn, &units, state.load);
     figures(ui, row, &first, state.load, &units);
@@ -124,7 +143,10 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
 /// Curves of one plot.
 struct Drawn<'a> {
     response: &'a Response,
-    ghost: Option<&'a Response>,
+    /// Whether names and colours stand above the plots.
+    legend: bool,
+    /// Name, colour and response of those beside it.
+    others: &'a [(String, egui::Color32, std::rc::Rc<Response>)],
     band: Option<&'a TuningSpread>,
 }
 
@@ -184,17 +206,17 @@ fn curves(
         .include_y(0.0);
     let time_label = if is_pv { String::new() } else { tr!("step.time_axis") };
     plot = plot.custom_x_axes(vec![plots::x_axis(time_label)]);
-    let names = (tr!("step.in_view"), tr!("rules.present"));
     plot.show(ui, |plot| {
-        let colour = if is_pv { p.pv } else { p.mv };
+        // Beside others the colour stands for the tuning, not for the signal.
+        let colour = if is_pv || drawn.legend { p.pv } else { p.mv };
         if let Some(band) = drawn.band {
             let values = if is_pv { &band.pv } else { &band.mv };
             plot.polygon(fan(&band.time_s, values).fill_color(colour.gamma_multiply(0.16)));
         }
-        if let Some(ghost) = drawn.ghost {
-            plot.line(Line::new(names.1, points(ghost)).color(p.ghost).width(1.2));
+        for (name, colour, other) in drawn.others {
+            plot.line(Line::new(name.clone(), points(other)).color(*colour).width(1.2));
         }
-        plot.line(Line::new(names.0, points(drawn.response)).color(colour).width(theme::LINE));
+        plot.line(Line::new(tr!("step.in_view"), points(drawn.response)).color(colour).width(theme::LINE));
     });
 }
 
@@ -214,7 +236,7 @@ fn figures(ui: &mut egui::Ui, row: &Row, response: &Response, load: bool, units:
     let p = theme::palette(ui);
     let words = match response.metrics() {
         Ok(m) if row.analysis.stable => {
-            let iae = if load { row.figures.iae_load } else { row.figures.iae_setpoint };
+            let iae = if load { row.figures.iae_load } else { Some(m.iae) };
             // Of a unit step: the PV per PV for a setpoint, per MV for a load.
             let gain = text::quotient(&units.0, &units.1);
             let with = |number: String, unit: String| format!("{number} {unit}");

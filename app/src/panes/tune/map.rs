@@ -81,7 +81,7 @@ pub(super) fn ui(ui: &mut egui::Ui, view: &View, state: &mut State, height: f32,
                 let name = tr!("tune.front", controller = kind.to_string());
                 let colour = if *kind == ControllerKind::Pi { p.pv } else { p.sp };
                 // Below the front nothing lies: there its name is in nobody's way.
-                if let Some(last) = points.get(points.len() / 3) {
+                if let Some(last) = points.get(2 * points.len() / 3) {
                     let label = RichText::new(name.clone()).size(theme::SMALL).color(colour);
                     let at = PlotPoint::new(last[0], last[1]);
                     plot.text(Text::new("", at, label).anchor(egui::Align2::RIGHT_TOP));

@@ -1,19 +1,22 @@
 //! Rules and the best gains compared on the model in use; one is looked at, and applied to the loop with one action.
 
+mod in_view;
 mod limits;
 mod map;
+mod setpoint;
 
 use eframe::egui::{self, RichText};
 use egui_extras::{Column, TableBuilder};
-use vasos_engine::control::PidTuning;
 use vasos_engine::document::{Candidate, DocumentCommand};
-use vasos_engine::tune::{ControllerKind, find_rule};
+use vasos_engine::tune::ControllerKind;
 
 use crate::action::Action;
 use crate::panes::View;
-use crate::tuning::{OPTIMAL, PRESENT, Refusal, Refused, Row, same_units};
+use crate::tuning::{DETUNED, OPTIMAL, PRESENT, Refusal, Refused, Row, same_units};
 use crate::widgets::segmented;
-use crate::{i18n, text, theme, tr};
+use crate::{text, theme, tr};
+
+pub(super) use in_view::new_filter_s;
 
 /// Width of a column of figures.
 const COLUMN: f32 = 35.0;
@@ -21,6 +24,9 @@ const COLUMN: f32 = 35.0;
 const ROW: f32 = 24.0;
 /// Height of the two lines of titles.
 const HEAD: f32 = 32.0;
+
+/// Height of what stands below the table before it has been drawn once.
+const BELOW: f32 = 58.0;
 
 /// Form in which gains are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -36,6 +42,8 @@ pub struct State {
     kind: usize,
     form: Form,
     map: bool,
+    /// Height of what stands below the table, as it was drawn last.
+    below: Option<f32>,
     on_map: map::State,
 }
 
@@ -76,11 +84,13 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         }
     });
     limits::ui(ui, view, &mut actions);
-    let below = 58.0;
+    ultimate(ui, view, &mut actions);
+    // Buttons wrap where the pane is narrow, and the table gives them the room they took.
+    let below = state.below.unwrap_or(BELOW);
     let height = (ui.available_height() - below).max(60.0);
     if state.map {
         map::ui(ui, view, &mut state.on_map, height, &mut actions);
-        details(ui, view, &mut actions);
+        in_view::below_table(ui, view, state, &mut actions);
         return actions;
     }
     egui::ScrollArea::horizontal().max_height(height).auto_shrink([false, false]).show(ui, |ui| {
@@ -88,7 +98,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         ui.spacing_mut().item_spacing = egui::vec2(3.0, 0.0);
         table(ui, view, state, height, &mut actions);
     });
-    details(ui, view, &mut actions);
+    in_view::below_table(ui, view, state, &mut actions);
     actions
 }
 
@@ -122,11 +132,13 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
     let chosen = row_in_view(view).map(|r| (r.rule, r.kind));
     let rows: Vec<&Row> =
         view.tuning.rows.iter().filter(|r| shown(state, r.kind) || r.rule == PRESENT).collect();
+    let place = |row: &Row| view.tuning.compared.iter().position(|c| same(c, row));
     let refusals: Vec<&Refusal> = view.tuning.refusals.iter().filter(|r| shown(state, r.kind)).collect();
     // Best gains that cannot be had stand where they would stand.
     let (first, last): (Vec<&Refusal>, Vec<&Refusal>) =
         refusals.into_iter().partition(|r| r.title_key == "rules.optimal");
-    let lead = rows.iter().take_while(|r| r.rule == PRESENT || r.rule == OPTIMAL).count();
+    let leading = |r: &Row| [PRESENT, OPTIMAL, DETUNED].contains(&r.rule);
+    let lead = rows.iter().take_while(|r| leading(r)).count();
     let entry = view.document.model();
     let (pv, mv) = entry.map_or(("", ""), |e| (e.pv_unit.as_str(), e.mv_unit.as_str()));
     // A long unit has no room above a narrow column; the pointer over the title shows it whole.
@@ -185,7 +197,8 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
                 };
                 let selected = chosen == Some((row.rule, row.kind));
                 line.set_selected(selected);
-                cells(&mut line, row, state, if selected { p.on_accent } else { p.text });
+                let ink = if selected { p.on_accent } else { p.text };
+                cells(&mut line, row, state, ink, place(row).map(|k| theme::series(&p, k + 1)));
                 if line.response().clicked() {
                     choose(row, actions);
                 }
@@ -195,18 +208,56 @@ fn table(ui: &mut egui::Ui, view: &View, state: &State, height: f32, actions: &m
 
 /// Makes a row the one in view.
 fn choose(row: &Row, actions: &mut Vec<Action>) {
-    let candidate =
-        Candidate { rule: row.rule.to_owned(), controller: row.kind.id().to_owned(), gains: row.gains };
-    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    actions.push(Action::Document(DocumentCommand::Candidate(Some(candidate(row)))));
     actions.push(Action::Seal);
 }
 
-fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink: egui::Color32) {
+fn candidate(row: &Row) -> Candidate {
+    Candidate { rule: row.rule.to_owned(), controller: row.kind.id().to_owned(), gains: row.gains }
+}
+
+fn same(a: &Row, b: &Row) -> bool {
+    a.rule == b.rule && a.kind == b.kind
+}
+
+/// What a row is called.
+#[must_use]
+pub fn title(row: &Row) -> String {
+    format!("{} · {}", tr!(&row.title_key), row.kind)
+}
+
+/// Ku and Pu of a test, where rules start from them, with the way back to the model's.
+fn ultimate(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
+    let Some(found) = view.document.ultimate else { return };
+    let p = theme::palette(ui);
+    ui.horizontal_wrapped(|ui| {
+        let used = view.document.model().is_some_and(|m| same_units(view.document, m, view.focus));
+        let words = tr!("tune.ultimate", ku = text::brief(found.ku), pu = text::brief(found.pu_s));
+        let words = if used { words } else { format!("! {}", tr!("tune.ultimate_other_units")) };
+        let colour = if used { p.weak } else { p.caution };
+        ui.add(egui::Label::new(RichText::new(words).size(theme::SMALL).color(colour)).wrap());
+        if ui.small_button(tr!("tune.ultimate_of_model")).clicked() {
+            actions.push(Action::Document(DocumentCommand::Ultimate(None)));
+        }
+    });
+}
+
+fn cells(
+    line: &mut egui_extras::TableRow<'_, '_>,
+    row: &Row,
+    state: &State,
+    ink: egui::Color32,
+    compared: Option<egui::Color32>,
+) {
     let flagged = !row.valid || !row.analysis.stable;
     line.col(|ui| {
         let sign = if flagged { "! " } else { "" };
-        let title = if row.rule == PRESENT { tr!("rules.present") } else { tr!(&row.title_key) };
-        let words = format!("{sign}{title} · {}", row.kind);
+        let words = format!("{sign}{}", title(row));
+        if let Some(colour) = compared {
+            let (place, dot) = ui.allocate_exact_size(egui::vec2(8.0, 8.0), egui::Sense::hover());
+            ui.painter().circle_filled(place.center(), 3.5, colour);
+            dot.on_hover_text(tr!("tune.compared"));
+        }
         ui.add(egui::Label::new(RichText::new(&words).size(theme::TABLE).color(ink)).truncate())
             .on_hover_text(words);
     });
@@ -238,106 +289,4 @@ fn cells(line: &mut egui_extras::TableRow<'_, '_>, row: &Row, state: &State, ink
             );
         });
     }
-}
-
-fn details(ui: &mut egui::Ui, view: &View, actions: &mut Vec<Action>) {
-    let Some(row) = row_in_view(view) else { return };
-    let p = theme::palette(ui);
-    let other_units = view.document.model().filter(|m| !same_units(view.document, m, view.focus));
-    let units = other_units.map(|m| tr!("tune.other_units", unit = text::quotient(&m.mv_unit, &m.pv_unit)));
-    let words = units.iter().cloned().chain(row.warnings.iter().map(|w| i18n::say(w)));
-    let words = proof(row).into_iter().chain(words).collect::<Vec<_>>().join(" · ");
-    let words = if row.analysis.stable { words } else { tr!("tune.unstable_hint") };
-    let flagged = units.is_some() || !row.analysis.stable || row.warnings.iter().any(|w| w.limits_validity());
-    let source = match (words.is_empty(), flagged) {
-        (true, _) => row.source.to_owned(),
-        (false, true) => format!("! {words}"),
-        (false, false) => words,
-    };
-    let colour = if flagged { p.caution } else { p.weak };
-    let line = ui.add(egui::Label::new(RichText::new(&source).size(theme::SMALL).color(colour)).truncate());
-    let formula = find_rule(row.rule, row.kind).and_then(|rule| rule.formula_text(row.kind));
-    let formula = formula.map_or_else(String::new, |f| format!("\n{f}\n{}", tr!("tune.formula_symbols")));
-    line.on_hover_text(format!("{source}\n{}{formula}", row.source));
-    ui.horizontal_wrapped(|ui| {
-        let tag = view.snapshot.loops.get(view.focus).map(|l| l.tag.clone());
-        let usable = row.gains.ti_s.is_finite() && row.analysis.stable;
-        let able = tag.is_some() && row.rule != PRESENT && usable;
-        let words = tag.as_ref().map_or_else(|| tr!("tune.apply"), |t| apply_words(view, row, t));
-        let button = egui::Button::new(RichText::new(words).color(p.on_accent)).fill(p.accent);
-        let hint = match (row.analysis.stable, row.gains.ti_s.is_finite()) {
-            (false, _) => tr!("tune.unstable_hint"),
-            (true, false) => tr!("tune.needs_integral"),
-            (true, true) => tr!("tune.apply_hint"),
-        };
-        if ui.add_enabled(able, button).on_hover_text(&hint).on_disabled_hover_text(hint).clicked()
-            && let Some(tag) = tag
-        {
-            actions.push(apply(view, row, tag));
-        }
-        if ui.button(tr!("tune.copy")).clicked() {
-            actions.push(Action::Copy(as_text(row)));
-        }
-        if let (Some(tau_c_s), Some(rule)) = (row.tau_c_s, find_rule(row.rule, row.kind)) {
-            let name = ui.label("τc");
-            let mut value = tau_c_s;
-            let field = egui::DragValue::new(&mut value)
-                .range(1e-3..=1e6)
-                .speed(tau_c_s / 100.0)
-                .max_decimals(3)
-                .suffix(" s");
-            let field = ui.add(field).labelled_by(name.id).on_hover_text(tr!("tune.tau_c_hint"));
-            if field.changed() {
-                actions.push(Action::Document(DocumentCommand::TauC(rule.id.to_owned(), Some(value))));
-            }
-            if field.drag_stopped() || field.lost_focus() {
-                actions.push(Action::Seal);
-            }
-            if view.document.tau_c_s.contains_key(rule.id) && ui.button(tr!("tune.default")).clicked() {
-                actions.push(Action::Document(DocumentCommand::TauC(rule.id.to_owned(), None)));
-            }
-        }
-    });
-}
-
-/// What holds the best gains where they are.
-fn proof(row: &Row) -> Option<String> {
-    let certificate = row.certificate.as_ref()?;
-    let active: Vec<String> = certificate.active.iter().map(ToString::to_string).collect();
-    let held = if active.is_empty() { "–".to_owned() } else { active.join(", ") };
-    Some(match certificate.gap {
-        Some(gap) => tr!("tune.proof", limits = held, gap = text::brief(100.0 * gap.max(1e-7))),
-        None => tr!("tune.proof_simulated", limits = held),
-    })
-}
-
-/// The PV filter that a row brings along, in seconds, where it is not the one in use.
-///
-/// Unfiltered derivative action keeps the pump at its limits with a rig's noise: with the paper's AMIGO tuning of
-/// STAD a filter of about Td (1 s) ends that.
-pub(super) fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
-    let now_s = view.document.rig.loops.get(tag).map_or(0.0, |s| s.pv_filter_s);
-    (row.gains.td_s > 0.0 && now_s == 0.0).then_some(row.gains.td_s)
-}
-
-/// What the button does, said on it.
-fn apply_words(view: &View, row: &Row, tag: &str) -> String {
-    match new_filter_s(view, row, tag) {
-        Some(filter_s) => tr!("tune.apply_filter", tag = tag, filter = text::brief(filter_s)),
-        None => tr!("tune.apply_to", tag = tag),
-    }
-}
-
-fn apply(view: &View, row: &Row, tag: String) -> Action {
-    let settings = view.document.rig.loops.get(&tag);
-    let (b, c) = settings.map_or((1.0, 0.0), |s| (s.tuning.b, s.tuning.c));
-    let kept_s = settings.map_or(0.0, |s| s.pv_filter_s);
-    let filter_s = new_filter_s(view, row, &tag).unwrap_or(kept_s);
-    let tuning = PidTuning { gains: row.gains, b, c };
-    Action::Document(DocumentCommand::ApplyTuning(tag, tuning, filter_s))
-}
-
-fn as_text(row: &Row) -> String {
-    let g = &row.gains;
-    format!("{} {}: Kc = {}, Ti = {} s, Td = {} s, N = {}", row.rule, row.kind, g.kc, g.ti_s, g.td_s, g.n)
 }

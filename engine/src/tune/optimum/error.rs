@@ -2,7 +2,7 @@
 
 use super::certificate::Limit;
 use crate::analyze::FrequencyResponseError;
-use crate::explain::{Explain, number};
+use crate::explain::{Explain, number, told_apart};
 
 /// Why there are no best gains.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,8 +46,8 @@ pub enum OptimumError {
     #[error(
         "no {controller} controller that stabilises this process keeps {} under {}: {} is the least that any reaches, with the other limits as they are",
         .limit,
-        number(*.asked),
-        number(*.floor)
+        asked_and_floor(*.asked, *.floor)[0],
+        asked_and_floor(*.asked, *.floor)[1]
     )]
     Infeasible {
         /// `PI` or `PID`.
@@ -81,6 +81,12 @@ pub enum OptimumError {
         /// `PI` or `PID`.
         controller: &'static str,
     },
+    /// A process whose response overflows or vanishes at every frequency.
+    #[error("a process gain of {} is beyond what can be calculated with: check its units", number(*.gain))]
+    OutOfRange {
+        /// First coefficient of G for s → 0.
+        gain: f64,
+    },
     /// The objective gets better without end.
     #[error(
         "the limits hold nothing here: the higher the gain, the better; set a limit on Ju, or give the model its dead time"
@@ -105,6 +111,13 @@ pub enum OptimumError {
     },
 }
 
+/// Both with the digits that tell them apart, and a limit just over 1 not as 1.
+fn asked_and_floor(asked: f64, floor: f64) -> [String; 2] {
+    let [short, floor] = told_apart(asked, floor);
+    let lost = asked > 1.0 && short == "1";
+    [if lost { asked.to_string() } else { short }, floor]
+}
+
 impl OptimumError {
     /// Whether this is the answer to a question, rather than a question that cannot be asked.
     #[must_use]
@@ -127,6 +140,7 @@ impl OptimumError {
             Self::Mt { value: 0.9 },
             Self::Ju { value: 0.0 },
             Self::Filter { value: 0.0 },
+            Self::OutOfRange { gain: 1e300 },
             Self::NoLimit,
             Self::NoProcess,
             Self::Infeasible { controller: "PI", limit: Limit::Ju, asked: 1.0, floor: 1.5 },
@@ -151,6 +165,7 @@ impl Explain for OptimumError {
             Self::Infeasible { .. } => "optimum.infeasible",
             Self::InfeasibleTogether { .. } => "optimum.infeasible_together",
             Self::NotStabilisable { .. } => "optimum.not_stabilisable",
+            Self::OutOfRange { .. } => "optimum.out_of_range",
             Self::Unbounded => "optimum.unbounded",
             Self::NeedsModel => "optimum.needs_model",
             Self::Measured(error) => error.key(),
@@ -163,18 +178,22 @@ impl Explain for OptimumError {
             Self::Ms { value } | Self::Mt { value } | Self::Ju { value } | Self::Filter { value } => {
                 vec![("value", number(*value))]
             }
-            Self::Infeasible { controller, limit, asked, floor } => vec![
-                ("controller", (*controller).to_owned()),
-                ("limit", limit.to_string()),
-                ("asked", number(*asked)),
-                ("floor", number(*floor)),
-            ],
+            Self::Infeasible { controller, limit, asked, floor } => {
+                let [asked, floor] = asked_and_floor(*asked, *floor);
+                vec![
+                    ("controller", (*controller).to_owned()),
+                    ("limit", limit.to_string()),
+                    ("asked", asked),
+                    ("floor", floor),
+                ]
+            }
             Self::InfeasibleTogether { controller, limit, floor } => vec![
                 ("controller", (*controller).to_owned()),
                 ("limit", limit.to_string()),
                 ("floor", number(*floor)),
             ],
             Self::NotStabilisable { controller } => vec![("controller", (*controller).to_owned())],
+            Self::OutOfRange { gain } => vec![("gain", number(*gain))],
             Self::Measured(error) => error.args(),
             Self::NotCertified { excess_percent } => vec![("excess", number(*excess_percent))],
             Self::NoLimit | Self::NoProcess | Self::Unbounded | Self::NeedsModel => vec![],

@@ -2,14 +2,9 @@
 
 use super::points::{Plant, Points};
 use super::problem::{LoopLimits, Process};
-use super::slice::{Lead, Shaped};
+use super::slice::Lead;
 use crate::analyze::{FrequencyResponseError, OpenLoop, Peaks, is_loop_stable, measured_peaks, peaks};
 use crate::control::ParallelGains;
-
-/// Gain Ki, relative to Kp times a frequency of the process, that stands for Ki → 0.
-const SMALL: f64 = 1e-6;
-/// Intervals of Kp that are looked at; those beyond belong to ripples.
-const MOST_INTERVALS: usize = 8;
 
 /// The processes, the sign of their gain turned positive.
 #[derive(Debug, Clone)]
@@ -48,8 +43,7 @@ impl<'a> Family<'a> {
         if self.halvings[plant] >= MOST {
             return;
         }
-        let start = if plant == 0 { 0 } else { self.ends[plant - 1] };
-        let own: Vec<f64> = self.points.omega[start..self.ends[plant]].to_vec();
+        let own: Vec<f64> = self.points.omega[self.own_points(plant)].to_vec();
         self.halvings[plant] += 1;
         let parts = 1 << self.halvings[plant];
         for pair in own.windows(2) {
@@ -69,12 +63,19 @@ impl<'a> Family<'a> {
         }
     }
 
+    /// Where a plant's own points stand among all.
+    pub fn own_points(&self, plant: usize) -> std::ops::Range<usize> {
+        let start = if plant == 0 { 0 } else { self.ends[plant - 1] };
+        start..self.ends[plant]
+    }
+
     /// Whether every loop is stable.
     pub fn is_stable(&self, lead: Lead, kp: f64, ki: f64) -> bool {
         (0..self.plants.len()).all(|i| self.is_one_stable(i, lead, kp, ki))
     }
 
-    fn is_one_stable(&self, plant: usize, lead: Lead, kp: f64, ki: f64) -> bool {
+    /// Whether one of them is.
+    pub fn is_one_stable(&self, plant: usize, lead: Lead, kp: f64, ki: f64) -> bool {
         let gains = self.gains(lead, kp, ki);
         match self.plants[plant].process {
             Process::Model(model) => is_loop_stable(&OpenLoop::of_parallel(model, &gains)),
@@ -116,72 +117,4 @@ impl<'a> Family<'a> {
         }
         largest
     }
-
-    /// Intervals of Kp ≥ 0 in which every loop is stable for Ki → 0⁺.
-    ///
-    /// Between two gains at which P(jω) Kp = −1 for some ω the number of unstable poles does not change, so one gain of
-    /// each interval is tested.
-    pub fn stabilising(&self, shaped: &Shaped<'_>) -> Vec<(f64, f64)> {
-        let mut common = vec![(0.0, f64::INFINITY)];
-        for plant in 0..self.plants.len() {
-            let own = self.stabilising_one(shaped, plant);
-            common = intersection(&common, &own);
-            if common.is_empty() {
-                break;
-            }
-        }
-        common
-    }
-
-    fn stabilising_one(&self, shaped: &Shaped<'_>, plant: usize) -> Vec<(f64, f64)> {
-        let start = if plant == 0 { 0 } else { self.ends[plant - 1] };
-        let mut breaks = vec![];
-        let p = &self.plants[plant];
-        let low = self.sign * p.low.coefficient;
-        if p.low.power == 0 && low < 0.0 {
-            breaks.push(-1.0 / low);
-        }
-        let high = self.sign * p.high * shaped.lead.high();
-        if high != 0.0 && (high < 0.0 || p.dead_time_s > 0.0) {
-            breaks.push(1.0 / high.abs());
-        }
-        for i in start + 1..self.ends[plant] {
-            let [(a_re, a_im), (b_re, b_im)] = [i - 1, i].map(|k| (shaped.p_re[k], shaped.p_im[k]));
-            if (a_im > 0.0) != (b_im > 0.0) {
-                let re = (b_re * a_im - a_re * b_im) / (a_im - b_im);
-                if re < 0.0 {
-                    breaks.push(-1.0 / re);
-                }
-            }
-        }
-        breaks.sort_unstable_by(f64::total_cmp);
-        breaks.truncate(MOST_INTERVALS);
-        let omega = p.typical_omega();
-        let mut found: Vec<(f64, f64)> = Vec::new();
-        let mut from = 0.0;
-        let scale = 1.0 / p.at_omega(omega).norm();
-        for k in 0..=breaks.len() {
-            let to = breaks.get(k).copied().unwrap_or(f64::INFINITY);
-            let inside = match (from == 0.0, to.is_finite()) {
-                (true, true) => 0.5 * to,
-                (true, false) => scale,
-                (false, true) => (from * to).sqrt(),
-                (false, false) => 2.0 * from,
-            };
-            let wide = to > from * (1.0 + 1e-9);
-            if wide && self.is_one_stable(plant, shaped.lead, inside, SMALL * inside * omega) {
-                match found.last_mut() {
-                    Some(last) if last.1 == from => last.1 = to,
-                    _ => found.push((from, to)),
-                }
-            }
-            from = to;
-        }
-        found
-    }
-}
-
-fn intersection(a: &[(f64, f64)], b: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x.0.max(y.0), x.1.min(y.1))));
-    pairs.filter(|(low, high)| low < high).collect()
 }

@@ -2,13 +2,9 @@
 
 use super::certificate::Limit;
 use super::error::OptimumError;
-use super::problem::{LoopLimits, Objective};
-use super::solve::{LARGEST_MS, Solver};
-
-/// Halvings of the logarithm of a limit's excess over 1.
-const HALVINGS: usize = 12;
-/// Largest values of limits that are tried.
-const MOST_JU: f64 = 1e6;
+use super::problem::LoopLimits;
+use super::relax::Relax;
+use super::solve::Solver;
 
 /// The limit on Ju that integral action rules out: C S is 1/G for ω → 0.
 pub(super) fn of_ju(solver: &Solver<'_>) -> Option<OptimumError> {
@@ -56,36 +52,5 @@ pub(super) fn explain(solver: &mut Solver<'_>) -> OptimumError {
 
 /// The least value of one limit, the others as given; `None` where relaxing it does not help.
 fn least(solver: &mut Solver<'_>, limit: Limit, given: &LoopLimits) -> Option<f64> {
-    let with = |value: f64| match limit {
-        Limit::Ms => LoopLimits { ms: value, ..*given },
-        Limit::Mt => LoopLimits { mt: value, ..*given },
-        Limit::Ju => LoopLimits { ju: value, ..*given },
-    };
-    let kept = solver.limits;
-    let mut met = |value: f64| {
-        solver.limits = with(value);
-        let found = solver.within_limits(Objective::MaxKi);
-        solver.limits = kept;
-        matches!(found, Ok(Some(_)) | Err(OptimumError::Unbounded))
-    };
-    let (mut low, most, base) = match limit {
-        Limit::Ms | Limit::Mt if given.ms.min(given.mt) >= LARGEST_MS => return None,
-        Limit::Ms => (given.ms - 1.0, LARGEST_MS - 1.0, 1.0),
-        Limit::Mt => (given.mt - 1.0, LARGEST_MS - 1.0, 1.0),
-        Limit::Ju => (given.ju, MOST_JU * given.ju, 0.0),
-    };
-    // Upwards first, so that the laxest limits, which need the closest points, are asked only where it must be.
-    low = low.max(1e-6);
-    let mut high = (2.0 * low).min(most);
-    while !met(base + high) {
-        if high >= most {
-            return None;
-        }
-        (low, high) = (high, (2.0 * high).min(most));
-    }
-    for _ in 0..HALVINGS {
-        let middle = (low * high).sqrt();
-        if met(base + middle) { high = middle } else { low = middle }
-    }
-    Some(base + high)
+    solver.least(Relax::one(limit, *given)?).map(|(value, _)| value)
 }

@@ -3,7 +3,9 @@
 use super::family::Family;
 use super::points::Points;
 use super::problem::{LoopLimits, Objective};
+use super::relax::Relax;
 use super::slice::{Allowed, Lead, LoadEnvelope, Shaped};
+use super::stabilising::OverKi;
 use super::valley::{Spot, valley};
 
 /// Shares of an interval of Kp at which the search looks first; closer at its ends, where narrow windows lie.
@@ -17,6 +19,9 @@ const COARSE_SHARES: [f64; 10] = [1e-3, 0.02, 0.07, 0.14, 0.22, 0.31, 0.42, 0.56
 const PER_DECADE: f64 = 3.0;
 const DECADES_BELOW: f64 = 4.0;
 const DECADES_ABOVE: f64 = 6.0;
+/// How far below the first gain of a grid the search goes where it may leave something there, and in which steps.
+const BELOW: f64 = 0.1;
+const STEPS_BELOW: i32 = 8;
 /// Relative width of the bracket of Kp at which the search ends.
 const FINE: f64 = 3e-8;
 const COARSE: f64 = 3e-4;
@@ -44,7 +49,7 @@ pub(super) struct Candidate {
     pub lead: Lead,
     pub kp: f64,
     pub ki: f64,
-    /// Jv, or −Ki.
+    /// Jv, −Ki, or how far a limit has to be relaxed.
     pub value: f64,
 }
 
@@ -65,6 +70,7 @@ pub(super) enum Found {
 pub(super) struct GainSearch {
     allowed: Allowed,
     envelope: LoadEnvelope,
+    over_ki: OverKi,
 }
 
 /// What a search runs on: the processes, the points that count, limits and objective.
@@ -74,6 +80,8 @@ pub(super) struct Ground<'a, 'b> {
     pub points: &'a Points,
     pub limits: LoopLimits,
     pub objective: Objective,
+    /// A limit to be made least in place of the objective.
+    pub relax: Option<Relax>,
 }
 
 /// One Td and Tf under search.
@@ -82,6 +90,7 @@ struct Task<'a, 'b> {
     shaped: Shaped<'a>,
     limits: LoopLimits,
     objective: Objective,
+    relax: Option<Relax>,
     /// Kp of these intervals stabilises with a small Ki.
     stabilising: Vec<(f64, f64)>,
     /// Kp = 0 does.
@@ -114,6 +123,7 @@ impl<'a, 'b> Task<'a, 'b> {
             shaped: Shaped::new(on.points, lead),
             limits: on.limits,
             objective: on.objective,
+            relax: on.relax,
             stabilising: Vec::new(),
             integral_alone: family.plants.iter().all(|p| p.low.power == 0),
             any_ki: family.plants.iter().all(plain),
@@ -166,7 +176,13 @@ impl GainSearch {
             if bounded <= low {
                 continue;
             }
-            let (grid, endless) = gains(task, low, bounded, care);
+            let (mut grid, endless) = gains(task, low, bounded, care);
+            // A search that only tells one Td from another is followed by one that walks.
+            if !endless && care != Care::Coarse && self.leaves_below(task, &grid, low) {
+                let first = grid[usize::from(grid[0] == 0.0)];
+                grid.extend((1..=STEPS_BELOW).map(|k| low + (first - low) * BELOW.powi(k)));
+                grid.sort_unstable_by(f64::total_cmp);
+            }
             match (self.over(task, &grid, width, endless), best) {
                 (Found::Best(new), Found::Best(old)) if new.value >= old.value => {}
                 (Found::Nothing | Found::NotStabilising, _) => {}
@@ -175,6 +191,15 @@ impl GainSearch {
             }
         }
         best
+    }
+
+    /// Whether the best of a grid may lie below its first gain: nothing else meets the limits.
+    fn leaves_below(&mut self, task: &Task<'_, '_>, grid: &[f64], low: f64) -> bool {
+        let mut above = grid.iter().filter(|kp| **kp > low);
+        let first = above.next().map_or(f64::INFINITY, |kp| self.at(task, *kp).value);
+        let second = above.next().map_or(f64::INFINITY, |kp| self.at(task, *kp).value);
+        first.is_infinite() && second.is_infinite() && !above.any(|kp| self.at(task, *kp).value.is_finite())
+            || first < second
     }
 
     /// Walks downhill from a gain until it stands in a valley, and to its bottom.
@@ -253,12 +278,15 @@ impl GainSearch {
         if kp == 0.0 && !task.integral_alone {
             return nothing;
         }
+        if let Some(relax) = &task.relax {
+            return self.least_at(task, relax, kp);
+        }
         self.allowed.at(&task.shaped, &task.limits, kp);
         if self.allowed.intervals.is_empty() {
             return nothing;
         }
         let mut best = nothing;
-        let mut load = false;
+        let (mut load, mut counted) = (false, false);
         for k in (0..self.allowed.intervals.len()).rev() {
             let (low, high) = self.allowed.intervals[k];
             if high.is_infinite() {
@@ -272,11 +300,18 @@ impl GainSearch {
                 Objective::Jv => 1.0 / high < best.value,
                 _ => -high < best.value,
             };
-            // From Ki = 0⁺ on nothing crosses −1; further intervals have to show that they are stable.
-            let known = low == 0.0;
-            if !better_possible || !(known || task.family.is_stable(task.shaped.lead, kp, 0.5 * (low + high)))
-            {
+            if !better_possible {
                 continue;
+            }
+            // From Ki = 0⁺ on nothing crosses −1; further intervals have to show that they are stable.
+            if low > 0.0 {
+                if !counted {
+                    self.over_ki.at(task.family, task.shaped.lead, kp);
+                    counted = true;
+                }
+                if !self.over_ki.is_stable(task.family, 0.5 * (low + high)) {
+                    continue;
+                }
             }
             let (ki, value) = if task.objective == Objective::Jv {
                 if !load {
@@ -292,6 +327,37 @@ impl GainSearch {
             }
         }
         best
+    }
+}
+
+impl GainSearch {
+    /// The least that a limit can be at a gain, with a Ki that comes so far.
+    fn least_at(&mut self, task: &Task<'_, '_>, relax: &Relax, kp: f64) -> AtGain {
+        /// Ratio of what is met and what is not at which halving ends.
+        const RATIO: f64 = 1.0 + 1e-6;
+        let mut counted = false;
+        let mut met = |above: f64| -> Option<f64> {
+            self.allowed.at(&task.shaped, &relax.limits(above), kp);
+            let unit = kp.max(f64::MIN_POSITIVE) * task.family.plants[0].typical_omega();
+            self.allowed.intervals.iter().find_map(|&(low, high)| {
+                let ki = if high.is_finite() { 0.5 * (low + high) } else { low + unit };
+                if low > 0.0 && !counted {
+                    self.over_ki.at(task.family, task.shaped.lead, kp);
+                    counted = true;
+                }
+                (low == 0.0 || self.over_ki.is_stable(task.family, ki)).then_some(ki)
+            })
+        };
+        let (mut low, mut high) = relax.range;
+        let Some(mut ki) = met(high) else { return AtGain { kp, ki: 0.0, value: f64::INFINITY } };
+        if let Some(ki) = met(low) {
+            return AtGain { kp, ki, value: low };
+        }
+        while high > low * RATIO {
+            let middle = (low * high).sqrt();
+            if let Some(found) = met(middle) { (high, ki) = (middle, found) } else { low = middle }
+        }
+        AtGain { kp, ki, value: high }
     }
 }
 

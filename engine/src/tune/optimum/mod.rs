@@ -22,9 +22,11 @@ mod gain_search;
 mod lead_search;
 mod points;
 mod problem;
+mod relax;
 mod simplex;
 mod slice;
 mod solve;
+mod stabilising;
 mod valley;
 
 pub use certificate::{Certificate, Limit, Optimum};

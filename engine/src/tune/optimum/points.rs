@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::problem::{LoopLimits, Process};
 use super::slice::Lead;
-use crate::analyze::{Asymptote, OpenLoop, natural_frequencies};
+use crate::analyze::{Asymptote, OpenLoop, natural_frequencies, resonances};
 use crate::control::PidGains;
 
 /// Ratio of neighbouring frequencies, and the largest step as a phase of the dead time in radians.
@@ -101,6 +101,8 @@ pub(super) struct Plant<'a> {
     pub dead_time_s: f64,
     /// Poles minus zeros.
     pub excess: usize,
+    /// Whether a pole or zero is so lightly damped that G jumps between two points.
+    pub resonant: bool,
 }
 
 impl<'a> Plant<'a> {
@@ -115,12 +117,19 @@ impl<'a> Plant<'a> {
                     high: bare.process_high(),
                     dead_time_s: tf.dead_time_s,
                     excess: tf.den.len() - tf.num.len(),
+                    resonant: !resonances(&bare).is_empty(),
                     bare: Some(bare),
                 }
             }
-            Process::Measured(response) => {
-                Self { process, bare: None, low: response.low(), high: 0.0, dead_time_s: 0.0, excess: 2 }
-            }
+            Process::Measured(response) => Self {
+                process,
+                bare: None,
+                low: response.low(),
+                high: 0.0,
+                dead_time_s: 0.0,
+                excess: 2,
+                resonant: false,
+            },
         }
     }
 
@@ -169,8 +178,9 @@ impl<'a> Plant<'a> {
         let stop = (last * ABOVE).max(ripples_end).min(self.known_up_to());
         // How slow the loop of an integrator is its gain alone decides.
         let mut omega = first / if self.low.power < 0 { BELOW_INTEGRATOR } else { BELOW };
+        let mut omegas = Vec::with_capacity(256);
         while omega < stop {
-            to.push(omega, sign * self.at_omega(omega));
+            omegas.push(omega);
             let near = omega < ripples_end.max(4.0 * last) && omega > 0.25 * first;
             let mut next = omega * if near { RATIO } else { RATIO_FAR };
             if omega < ripples_end {
@@ -178,11 +188,9 @@ impl<'a> Plant<'a> {
             }
             omega = next;
         }
-        to.push(stop, sign * self.at_omega(stop));
-        if let Some(bare) = &self.bare {
-            for omega in crate::analyze::resonances(bare) {
-                to.push(omega, sign * self.at_omega(omega));
-            }
-        }
+        omegas.push(stop);
+        omegas.extend(self.bare.iter().flat_map(resonances));
+        omegas.sort_unstable_by(f64::total_cmp);
+        omegas.into_iter().for_each(|omega| to.push(omega, sign * self.at_omega(omega)));
     }
 }

@@ -7,8 +7,9 @@ use super::family::Family;
 use super::floor;
 use super::gain_search::{Candidate, Care, Found, GainSearch, Ground};
 use super::lead_search;
-use super::points::Plant;
+use super::points::{Plant, Points};
 use super::problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
+use super::relax::Relax;
 use super::slice::Lead;
 
 /// Rounds of search and check, and of the last steps at fixed Kp, at most.
@@ -40,15 +41,29 @@ pub fn optimum(problem: &OptimumProblem<'_>) -> Result<Optimum, OptimumError> {
     validate(problem)?;
     let sign = Plant::new(&problem.processes[0]).low.coefficient.signum();
     let found = with_sign(problem, sign);
-    match found {
-        // An unstable process may want the other sign than its static gain has.
-        Err(OptimumError::NotStabilisable { .. }) => with_sign(problem, -sign),
-        _ => found,
+    let not_stabilisable = matches!(found, Err(OptimumError::NotStabilisable { .. }));
+    // What holds these gains is not a limit but where the measurement ends.
+    let held_by_nothing = found.as_ref().is_ok_and(|f| f.certificate.active.is_empty());
+    if not_stabilisable || held_by_nothing || found == Err(OptimumError::Unbounded) {
+        for process in problem.processes {
+            if let Process::Measured(response) = process {
+                response.reaches_half_turn().map_err(OptimumError::Measured)?;
+            }
+        }
     }
+    if !not_stabilisable {
+        return found;
+    }
+    // An unstable process may want the other sign than its static gain has.
+    with_sign(problem, -sign)
 }
 
 fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, OptimumError> {
     let mut solver = Solver::new(problem, sign);
+    let lost = (0..solver.family.plants.len()).find(|&plant| solver.family.own_points(plant).is_empty());
+    if let Some(plant) = lost {
+        return Err(OptimumError::OutOfRange { gain: solver.family.plants[plant].low.coefficient });
+    }
     if let Some(refused) = floor::of_ju(&solver) {
         return Err(refused);
     }
@@ -75,6 +90,26 @@ fn validate(problem: &OptimumProblem<'_>) -> Result<(), OptimumError> {
         return Err(OptimumError::NeedsModel);
     }
     if problem.processes.is_empty() { Err(OptimumError::NoProcess) } else { Ok(()) }
+}
+
+/// What a search is after.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quest {
+    pub objective: Objective,
+    pub limits: LoopLimits,
+    /// A limit to be made least in place of the objective.
+    pub relax: Option<Relax>,
+}
+
+impl Quest {
+    /// The limits that bear on gains: those that they come down to where one is made least.
+    fn limits_at(&self, known: &Candidate) -> LoopLimits {
+        self.relax.map_or(self.limits, |relax| relax.limits(known.value))
+    }
+
+    fn on<'a, 'b>(&self, family: &'a Family<'b>, points: &'a Points) -> Ground<'a, 'b> {
+        Ground { family, points, limits: self.limits, objective: self.objective, relax: self.relax }
+    }
 }
 
 /// A problem with its points and workspace.
@@ -108,8 +143,8 @@ impl<'a> Solver<'a> {
     }
 
     /// The whole range, without a start.
-    pub fn look_everywhere(&mut self, objective: Objective, limits: &LoopLimits) -> Found {
-        let on = Ground { family: &self.family, points: &self.family.points, limits: *limits, objective };
+    pub fn look_everywhere(&mut self, quest: &Quest) -> Found {
+        let on = quest.on(&self.family, &self.family.points);
         let mut pi = self.search.run(&on, Lead::NONE, Care::Full);
         if pi == Found::Nothing {
             pi = self.search.run(&on, Lead::NONE, Care::Dense(DENSER));
@@ -126,7 +161,7 @@ impl<'a> Solver<'a> {
             pid = lead_search::look(&mut self.search, &on, filter, 0.1 * omega);
         }
         let pid = match pid {
-            Found::Best(known) => self.refined(objective, limits, filter, known, lead_search::STEP),
+            Found::Best(known) => self.refined(quest, filter, known, lead_search::STEP),
             other => other,
         };
         match (pid, pi) {
@@ -137,17 +172,10 @@ impl<'a> Solver<'a> {
     }
 
     /// About known gains, on the points that bear on them and on those that turn out to.
-    fn refined(
-        &mut self,
-        objective: Objective,
-        limits: &LoopLimits,
-        filter: DerivativeFilter,
-        known: Candidate,
-        step: f64,
-    ) -> Found {
+    fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, step: f64) -> Found {
         let all = &self.family.points;
-        let mut points = all.near(limits, known.lead, known.kp, known.ki);
-        let whole = Ground { family: &self.family, points: all, limits: *limits, objective };
+        let mut points = all.near(&quest.limits_at(&known), known.lead, known.kp, known.ki);
+        let whole = quest.on(&self.family, all);
         let mut best: Option<Candidate> = None;
         for trial in 0..TRIALS {
             let on = Ground { points: &points, ..whole };
@@ -167,7 +195,7 @@ impl<'a> Solver<'a> {
             if stable.is_some_and(|seen| seen.value - found.value <= SEEN * found.value.abs()) {
                 break;
             }
-            points.extend(&all.near(limits, found.lead, found.kp, found.ki));
+            points.extend(&all.near(&quest.limits_at(&found), found.lead, found.kp, found.ki));
         }
         best.map_or(Found::Best(known), Found::Best)
     }
@@ -180,15 +208,16 @@ impl<'a> Solver<'a> {
         peak.filter(|w| *w > 0.0 && w.is_finite()).unwrap_or(typical)
     }
 
-    fn look_nearby(&mut self, objective: Objective, known: Candidate) -> Found {
-        let limits = self.limits;
+    /// About known gains, to the last digit.
+    pub fn look_nearby(&mut self, quest: &Quest, known: Candidate) -> Found {
         match self.wanted {
             Wanted::Pid(filter) if known.lead.td_s > 0.0 => {
-                self.refined(objective, &limits, filter, known, lead_search::STEP_NEARBY)
+                self.refined(quest, filter, known, lead_search::STEP_NEARBY)
             }
             _ => {
+                let limits = quest.limits_at(&known);
                 let points = self.family.points.near(&limits, known.lead, known.kp, known.ki);
-                let on = Ground { family: &self.family, points: &points, limits, objective };
+                let on = quest.on(&self.family, &points);
                 self.search.run(&on, known.lead, Care::Near(known.kp))
             }
         }
@@ -202,7 +231,7 @@ impl<'a> Solver<'a> {
         lead: Lead,
         kp: f64,
     ) -> Option<Candidate> {
-        let on = Ground { family: &self.family, points: &self.family.points, limits: *limits, objective };
+        let on = Quest { objective, limits: *limits, relax: None }.on(&self.family, &self.family.points);
         self.search.at_gain(&on, lead, kp)
     }
 
@@ -223,11 +252,18 @@ impl<'a> Solver<'a> {
         }
         let mut known: Option<Candidate> = None;
         let mut excess = f64::INFINITY;
+        let quest = Quest { objective, limits: self.limits, relax: None };
+        let mut sought_least = false;
         for round in 1..=ROUNDS {
-            let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(objective, k));
+            let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(&quest, k));
             if found == Found::Nothing {
-                let limits = self.limits;
-                found = self.look_everywhere(objective, &limits);
+                found = self.look_everywhere(&quest);
+            }
+            if found == Found::Nothing && !sought_least {
+                // Near the least limits the gains that meet them are too few for a grid.
+                sought_least = true;
+                let least = self.least(Relax::together(self.limits)).filter(|(stretch, _)| *stretch <= 1.0);
+                found = least.map_or(Found::Nothing, |(_, candidate)| Found::Best(candidate));
             }
             let candidate = match found {
                 Found::Best(candidate) => candidate,
