@@ -53,6 +53,11 @@ impl<'a> Family<'a> {
         }
     }
 
+    /// Whether points have been added between those that a plant started with.
+    pub fn is_refined(&self) -> bool {
+        self.halvings.iter().any(|times| *times > 0)
+    }
+
     /// Gains with their sign, as a controller of the parallel form.
     pub fn gains(&self, lead: Lead, kp: f64, ki: f64) -> ParallelGains {
         ParallelGains {
