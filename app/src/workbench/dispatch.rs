@@ -49,11 +49,7 @@ impl Workbench {
             },
             Action::AskFile => self.jobs.ask_file(),
             Action::OpenFile(path) => self.open(path),
-            Action::OpenLogs(paths) => {
-                self.notice = None;
-                let options = vasos_io::log::ImportOptions::default();
-                self.jobs.start("import", move || files::read_log(&paths, &options));
-            }
+            Action::OpenLogs(paths) => self.open_logs(paths),
             Action::ToggleRecording => self.toggle_recording(),
             Action::RecordAlways(on) => {
                 self.settings.record_always = on;
@@ -166,6 +162,12 @@ impl Workbench {
         for command in rig.commands_after_load() {
             self.rig_command(SessionCommand::Rig(command));
         }
+    }
+
+    fn open_logs(&mut self, paths: Vec<PathBuf>) {
+        self.notice = None;
+        let options = vasos_io::log::ImportOptions::default();
+        self.jobs.start("import", move || files::read_log(&paths, &options));
     }
 
     fn open(&mut self, path: PathBuf) {
