@@ -1,8 +1,10 @@
 //! Logs as the programs of plants and laboratories export them, a few rows of each, made up after their formats.
 
+use std::path::Path;
+
 use vasos_engine::signal::LogStart;
 use vasos_io::log::{
-    Decimal, FileFormat, ImportOptions, ImportedLog, Repair, Separator, TimeKind, import_log,
+    Decimal, FileFormat, ImportOptions, ImportedLog, Repair, Separator, TimeKind, import_log, open_log,
 };
 
 fn import(text: &str) -> ImportedLog {
@@ -382,4 +384,55 @@ fn a_workbook_comes_from_memory_as_well() {
     };
     assert!(error.to_string().contains("workbook"), "{error}");
     assert!(!matches!(import("time,pv\n0,1\n1,2\n").report.format, FileFormat::Workbook { .. }));
+}
+
+/// Written by pandas 2 with odfpy, and by xlwt: twelve rows of 10 s below a header, in the `.ods` on the second sheet.
+#[test]
+fn workbooks_of_other_programs_are_read_as_well() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/workbooks");
+    for name in ["trend.ods", "trend.xls"] {
+        let log = open_log(&folder.join(name), &ImportOptions::default()).expect(name);
+        assert!(matches!(&log.report.format, FileFormat::Workbook { sheet } if sheet == "Trend"), "{name}");
+        let table = &log.table;
+        assert_eq!((table.len(), table.time_s[11]), (12, 110.0), "{name}");
+        assert_eq!(table.start, LogStart::Calendar("2024-03-05T06:00:00".to_owned()), "{name}");
+        let column = |i: usize| table.columns[i].values.clone();
+        assert!(column(0).iter().enumerate().all(|(i, v)| *v == 50.0 + 0.5 * i as f64), "{name}");
+        assert!(column(2).iter().enumerate().all(|(i, v)| *v == 30.0 - 0.25 * i as f64), "{name}");
+        assert_eq!(table.columns[3].states, ["AUTO", "MAN"], "{name}");
+        assert_eq!(log.report.roles.mode.as_deref(), Some("TIC101.MODE"), "{name}");
+    }
+}
+
+#[test]
+fn decimal_commas_in_quotes_stand_between_commas() {
+    let log = import("time,pv,mv\n0,\"1,5\",\"3,25\"\n1,\"1,6\",4\n2,\"1,75\",\"-5,5\"\n3,2,\"6,0\"\n");
+    assert_eq!(log.table.columns[0].values, [1.5, 1.6, 1.75, 2.0]);
+    assert_eq!(log.table.columns[1].values, [3.25, 4.0, -5.5, 6.0]);
+    // Quotes alone change nothing.
+    let log = import("time,pv,mv\n0,\"1.5\",\"3.25\"\n1,\"1.6\",4\n2,\"1.75\",\"-5.5\"\n");
+    assert_eq!(log.table.columns[0].values, [1.5, 1.6, 1.75]);
+    let log = import("time,note,pv,mv\n0,\"a, b\",1.5,3\n1,\"c\",1.6,4\n2,\"d, e\",1.75,5\n");
+    assert_eq!(log.table.column("pv").expect("pv").values, [1.5, 1.6, 1.75]);
+}
+
+/// A remark that an operator typed with line ends in it: one field, one row, and the lines counted on.
+#[test]
+fn remarks_of_several_lines_are_one_field() {
+    let text = "time,pv,note,mv\n0,1.5,\"first\nline, two\",3\n1,1.6,plain,4\n2,1.7,\"again\r\n\r\nthree\",5\n3,bad,,6\n";
+    let log = import(text);
+    assert_eq!(column(&log, "mv"), [3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(column(&log, "pv")[..3], [1.5, 1.6, 1.7]);
+    assert_eq!(log.table.lines, [2, 4, 5, 8]);
+    let missing = |r: &Repair| matches!(r, Repair::MissingValues { column, line: 8, .. } if column == "pv");
+    assert!(log.report.repairs.iter().any(missing), "{:?}", log.report.repairs);
+    // Through many blocks of a long file as well.
+    let row = |k: usize| match k % 97 {
+        0 => format!("{k},{:.3},\"a remark\nof {k}, in two lines\",{:.3}", pv(k), mv(k)),
+        _ => format!("{k},{:.3},,{:.3}", pv(k), mv(k)),
+    };
+    let log = import(&rows("time,pv,note,mv\n", 60_000, row));
+    assert_eq!(log.table.len(), 60_000, "{:?}", log.report.repairs);
+    assert!(log.table.time_s.iter().enumerate().all(|(k, t)| *t == k as f64));
+    assert_eq!(log.table.lines[59_999], 60_001 + 59_999_u32.div_ceil(97));
 }

@@ -144,12 +144,14 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
 }
 
 fn best_candidate(lines: &[&str], judged: &[usize]) -> Option<Candidate> {
+    // Beside decimal commas, commas can only separate fields that stand in quotes.
+    let quoted = judged.iter().any(|&i| lines[i].contains('"'));
     let arrows = judged.iter().filter(|&&i| arrow(lines[i]).is_some()).count();
     let mut best: Option<Candidate> = None;
     for labelled in [false, true] {
         for separator in SEPARATORS {
             for decimal in [Decimal::Point, Decimal::Comma] {
-                if separator == Separator::Comma && decimal == Decimal::Comma {
+                if separator == Separator::Comma && decimal == Decimal::Comma && !quoted {
                     continue;
                 }
                 let dialect = Dialect { separator, arrow: arrows * 2 > judged.len(), labelled };

@@ -31,6 +31,7 @@ mod order;
 mod pairs;
 mod parquet;
 mod pivot;
+mod quotes;
 mod read;
 mod recorded;
 mod repair;

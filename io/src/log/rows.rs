@@ -6,6 +6,7 @@ use super::decode::Charset;
 use super::fast::{Slot, Taken, quick_row};
 use super::kinds::kinds;
 use super::layout::{Layout, is_blank, is_remark};
+use super::quotes::{FOLD, unfolded};
 use super::read::{Kind, Read, ReadColumn};
 use super::source::{Blocks, Sample};
 use super::stamp::{DateOrder, Stamp, StampReader, parse as parse_stamp};
@@ -102,7 +103,11 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn new(sample: &Sample, layout: &'a Layout) -> Self {
         let kinds = kinds(sample, layout);
-        let plain = layout.dialect.is_plain() && layout.dialect.separator != super::Separator::DoubleBar;
+        let separator = layout.dialect.separator;
+        // Where one sign is separator and decimal mark, quotes tell them apart.
+        let plain = layout.dialect.is_plain()
+            && separator != super::Separator::DoubleBar
+            && separator.byte() != Some(layout.decimal.mark());
         let slots = if plain {
             let column = |at: usize| layout.used.iter().position(|&used| used == at);
             (0..layout.fields).map(|at| column(at).map_or(Slot::Empty, Slot::Column)).collect()
@@ -134,14 +139,20 @@ impl<'a> Reader<'a> {
         blocks: &mut Blocks<R>,
         line_end: u8,
     ) -> Result<Option<Again>, ImportError> {
-        let mut number = 0;
+        // Rows counted, and lines: a row with a remark of several lines has as many.
+        let (mut index, mut number) = (0, 0);
         while let Some(block) = blocks.next()? {
             let mut start = 0;
+            let folded = memchr::memchr(FOLD, block).is_some();
             while start < block.len() {
                 let end = memchr::memchr(line_end, &block[start..]).map_or(block.len(), |i| start + i);
+                index += 1;
                 number += 1;
-                if number > self.layout.first_row {
+                if index > self.layout.first_row {
                     self.line(number, block, start, end);
+                }
+                if folded {
+                    number += memchr::memchr_iter(FOLD, &block[start..end]).count();
                 }
                 start = end + 1;
             }
@@ -177,7 +188,7 @@ impl<'a> Reader<'a> {
             self.blanks.clear();
         }
         let charset = self.charset;
-        let text = charset.text(&block[start..end]);
+        let text = unfolded(charset.text(&block[start..end]));
         if is_remark(&text) {
             self.skipped.add(number);
         } else if !is_blank(&text) {

@@ -4,6 +4,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use super::ImportError;
 use super::decode::{Charset, detect};
+use super::quotes::{fold, unfolded};
 
 /// Bytes read at once.
 const BLOCK: usize = 1 << 18;
@@ -39,8 +40,9 @@ impl Sample {
         let head = read_at(input, 0, HEAD)?;
         let charset = detect(&head)?;
         let whole = head.len() as u64 >= length;
-        let text = decoded(&charset, &head[charset.mark..]);
+        let mut text = decoded(&charset, &head[charset.mark..]);
         let line_end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+        fold(&mut text, line_end);
         let mut lines = lines_of(&text, line_end, &charset);
         if !whole && lines.len() > 1 {
             lines.pop();
@@ -80,7 +82,7 @@ fn decoded(charset: &Charset, bytes: &[u8]) -> Vec<u8> {
 
 fn lines_of(text: &[u8], line_end: u8, charset: &Charset) -> Vec<String> {
     text.split(|&b| b == line_end)
-        .map(|line| charset.text(&line[..line.len().min(LONGEST_LINE)]))
+        .map(|line| unfolded(charset.text(&line[..line.len().min(LONGEST_LINE)])))
         .map(|line| line.strip_suffix('\r').unwrap_or(&line).to_owned())
         .collect()
 }
@@ -125,10 +127,14 @@ impl<R: Read + Seek> Blocks<R> {
         let mut searched = 0;
         loop {
             if let Some(last) = memchr::memrchr(self.line_end, &self.text[searched..]) {
-                self.given = searched + last + 1;
-                return Ok(Some(&self.text[..self.given]));
+                let whole = fold(&mut self.text[..=searched + last], self.line_end);
+                if whole > 0 {
+                    self.given = whole;
+                    return Ok(Some(&self.text[..whole]));
+                }
             }
             if self.ended || self.text.len() > LONGEST_LINE {
+                fold(&mut self.text, self.line_end);
                 self.given = self.text.len();
                 return Ok((self.given > 0).then_some(&self.text[..self.given]));
             }
