@@ -329,7 +329,7 @@ fn bad_input_ends_with_2_and_says_what_to_do() {
         (&["identify", &missing, "--drift", "cubic"][..], "linear"),
         (&["identify", &missing, "--mv-min", "5", "--mv-max", "1"][..], "must lie below"),
         (&["simulate", &missing][..], "nothing.csv"),
-        (&["simulate", &missing, "-o", "x.parquet"][..], "not available yet"),
+        (&["simulate", &missing, "-o", "x.txt"][..], ".parquet or .rrd"),
         (&["serve"][..], "not available yet"),
         (&["analyze"][..], "--model"),
     ] {
