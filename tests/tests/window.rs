@@ -1,66 +1,19 @@
 //! The window as a user meets it, driven through its accessible names, without a display.
 
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+mod window_harness;
 
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use vasos_app::action::Action;
 use vasos_app::i18n::Language;
 use vasos_app::panes::PaneKind;
 use vasos_app::panes::pid::layout::Layout;
 use vasos_app::panes::pid::model::PidModel;
-use vasos_app::workbench::{Options, Workbench};
 use vasos_engine::control::{Mode, PidGains, PidTuning};
 use vasos_engine::document::{Candidate, DocumentCommand, LogRoles, SourceChoice, Stretch};
 use vasos_engine::model::ProcessModel;
-use vasos_engine::plant::Measurement;
-use vasos_engine::session::{Rig, RigCommand, Session, SessionCommand};
-use vasos_io::recording::{Recording, RecordingOptions};
+use vasos_engine::session::RigCommand;
 use vasos_tests::typed_model;
-
-type Window<'a> = Harness<'a, Workbench>;
-
-fn window<'a>(size: [f32; 2]) -> Window<'a> {
-    let options = Options { paused: true, forget: true, ..Options::default() };
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_max_steps(12)
-        .wgpu()
-        .build_eframe(|cc| Workbench::new(&cc.egui_ctx, options).expect("the preset starts"));
-    harness.run_steps(3);
-    harness
-}
-
-fn act(harness: &mut Window, action: Action) {
-    let ctx = harness.ctx.clone();
-    harness.state_mut().act(&ctx, action);
-    harness.run_steps(1);
-}
-
-fn wait(harness: &mut Window, what: &str, mut done: impl FnMut(&Workbench) -> bool) {
-    let start = Instant::now();
-    while !done(harness.state()) {
-        assert!(start.elapsed() < Duration::from_secs(20), "waited in vain for: {what}");
-        std::thread::sleep(Duration::from_millis(5));
-        harness.run_steps(1);
-    }
-    harness.run_steps(2);
-}
-
-fn step(harness: &mut Window, samples: u64) {
-    let wanted = harness.state().snapshot().samples + samples;
-    send(harness, samples);
-    wait(harness, "samples", |w| w.snapshot().samples >= wanted);
-}
-
-/// Asks for samples without drawing a frame for each.
-fn send(harness: &mut Window, samples: u64) {
-    let ctx = harness.ctx.clone();
-    for _ in 0..samples {
-        harness.state_mut().act(&ctx, Action::Step);
-    }
-}
+use window_harness::{Window, act, drop_on, picture, send, step, wait, window};
 
 /// The issue: a test turns a valve and finds the drawn flow equal to the snapshot's; levels, flows and arrows follow
 /// through coupled, decoupled, reversed flow between TQ1 and TQ2, overflow and empty.
@@ -216,26 +169,6 @@ fn from_a_dropped_log_to_a_tuned_loop() {
     });
 }
 
-/// A file as the system hands it over when it is let go above the window.
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl eframe::egui::DroppedFile for Dropped {
-    fn path(&self) -> &std::path::Path {
-        &self.0
-    }
-
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        std::fs::read(&self.0).map_err(|e| e.to_string())
-    }
-}
-
-fn drop_on(harness: &mut Window, path: PathBuf) {
-    harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(path)));
-    harness.run_steps(1);
-    assert!(harness.state().is_busy() || !harness.state().journal().is_empty(), "the drop was noticed");
-}
-
 /// The issue: bad input gets a clear error and loses nothing.
 #[test]
 fn bad_files_get_a_clear_error_and_lose_nothing() {
@@ -374,17 +307,6 @@ fn other_rigs_languages_and_logs_look_as_they_did() {
     results.extend_harness(&mut harness);
 }
 
-fn picture(harness: &mut Window, name: &str) {
-    // What panes have asked for is worked out beside the window, one question after the other.
-    for _ in 0..3 {
-        harness.run_steps(2);
-        wait(harness, "answers", |w| !w.is_answering());
-    }
-    // Software renderers of other versions differ by a little in antialiasing.
-    let options = egui_kittest::SnapshotOptions::new().threshold(1.5).max_failed_pixels(1500);
-    harness.snapshot_options(name, &options);
-}
-
 /// A test of the running loop from the pane: listens, moves, restores, and its record becomes the model in use.
 #[test]
 fn the_running_loop_is_tested_and_its_record_becomes_the_model() {
@@ -435,117 +357,6 @@ fn a_fault_is_switched_where_it_is() {
     step(&mut harness, 2);
     assert!(harness.state().snapshot().faults.is_empty());
     assert!(harness.state().snapshot().loops[0].pv_cm.is_finite());
-}
-
-/// A recording of three minutes with a step of the setpoint, of the valve and another tuning.
-fn recorded(path: &std::path::Path, runs: usize) {
-    let network = vasos_io::rig::preset("stad").expect("preset");
-    let rig = Rig { network, configuration: 0, measurement: Measurement::DEFAULT, seed: 7 };
-    let session = Session::start(&rig, Box::new(|| ())).expect("starts");
-    let options = RecordingOptions { serve: false, ..RecordingOptions::default() };
-    let (recording, sink) = Recording::start(path, options).expect("records");
-    assert!(session.send(SessionCommand::Attach { id: recording.id(), sink }));
-    let tag = || "LIC-02".to_owned();
-    let samples = |count: u64| {
-        let wanted = session.snapshot().samples + count;
-        (0..count).for_each(|_| assert!(session.send(SessionCommand::Step)));
-        while session.snapshot().samples < wanted {
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    };
-    for run in 0..runs as u64 {
-        if run > 0 {
-            assert!(session.send(SessionCommand::Load(Box::new(rig.clone()))));
-            while session.snapshot().run < run {
-                std::thread::sleep(Duration::from_millis(2));
-            }
-        }
-        samples(100);
-        let tuning = PidTuning::new(PidGains { kc: 4.0, ti_s: 60.0, td_s: 0.0, n: 10.0 });
-        for command in [
-            RigCommand::Tuning { tag: tag(), tuning },
-            RigCommand::Setpoint { tag: tag(), level_cm: 17.0 },
-            RigCommand::Valve { tag: "FV03".to_owned(), angle_deg: 70.0 },
-        ] {
-            assert!(session.send(SessionCommand::Rig(command)));
-            samples(250);
-        }
-    }
-    assert!(session.send(SessionCommand::Detach { id: recording.id() }));
-    recording.close().expect("closes");
-}
-
-/// The issue: Replay as a source with scrub bar and speed. A recording brings its rig and its settings; nothing of it can
-/// be changed, and the simulated rig is as it was when it comes back.
-#[test]
-fn a_recording_is_played_and_scrubbed_through() {
-    let mut results = egui_kittest::SnapshotResults::new();
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("lesson.rrd");
-    recorded(&path, 1);
-    let mut harness = window([1440.0, 900.0]);
-    act(&mut harness, Action::OpenPreset("simtank1"));
-    step(&mut harness, 30);
-    drop_on(&mut harness, path);
-    wait(&mut harness, "the recording", |w| w.snapshot().span_s.is_some() && w.run().end_s() > 169.0);
-    assert_eq!(harness.state().document().source, SourceChoice::Replay);
-    assert_eq!(harness.state().snapshot().network.spec.id, "stad");
-    let kc = |h: &Window| h.state().snapshot().loops[0].tuning.gains.kc;
-    assert_eq!((kc(&harness), harness.state().snapshot().loops[0].setpoint_cm), (1.8, 15.0));
-    act(&mut harness, Action::Seek(100.0));
-    wait(&mut harness, "another time", |w| w.snapshot().time_s == 100.0);
-    assert_eq!((kc(&harness), harness.state().snapshot().loops[0].setpoint_cm), (4.0, 17.0));
-    harness.get_by_label("Time of the recording");
-    // What the recording cannot do is said, and nothing has changed.
-    act(&mut harness, Action::Document(DocumentCommand::Setpoint("LIC-02".to_owned(), 12.0)));
-    let said = harness.state().journal().back().expect("an entry").words.clone();
-    assert!(said.contains("recording cannot be changed"), "{said}");
-    assert_eq!(harness.state().snapshot().loops[0].setpoint_cm, 17.0);
-    harness.run_steps(2);
-    harness.get_by_label("OK").click();
-    harness.run_steps(2);
-    harness.remove_cursor();
-    picture(&mut harness, "replay_1440x900");
-    // It plays, and its rows are there to identify from.
-    act(&mut harness, Action::Speed(1000.0));
-    act(&mut harness, Action::ToggleRunning);
-    wait(&mut harness, "the end", |w| w.snapshot().time_s > 169.7 && !w.snapshot().running);
-    act(
-        &mut harness,
-        Action::Document(DocumentCommand::Stretch(Some(Stretch { from_s: 10.0, to_s: 169.0 }))),
-    );
-    act(&mut harness, Action::Identify);
-    wait(&mut harness, "a fit", |w| !w.is_busy());
-    // Taking the recording back brings the rig before it back.
-    for _ in 0..10 {
-        if harness.state().document().recording.is_some() {
-            act(&mut harness, Action::Undo);
-        }
-    }
-    wait(&mut harness, "the rig before", |w| w.snapshot().span_s.is_none());
-    assert_eq!(harness.state().document().rig.network.spec.id, "simtank1");
-    wait(&mut harness, "its own rows", |w| w.snapshot().network.spec.id == "simtank1");
-    results.extend_harness(&mut harness);
-
-    let several = folder.path().join("several.rrd");
-    recorded(&several, 2);
-    let mut harness = window([1280.0, 720.0]);
-    act(&mut harness, Action::ToggleTheme);
-    drop_on(&mut harness, several);
-    wait(&mut harness, "a choice", |w| !w.is_busy());
-    harness.run_steps(2);
-    harness.remove_cursor();
-    picture(&mut harness, "replay_choice");
-    act(&mut harness, Action::PlayRun(1));
-    wait(&mut harness, "the second run", |w| w.snapshot().span_s.is_some() && w.run().end_s() > 169.0);
-    act(&mut harness, Action::Seek(40.0));
-    wait(&mut harness, "another time", |w| w.snapshot().time_s == 40.0);
-    harness.remove_cursor();
-    picture(&mut harness, "replay_1280x720");
-    act(&mut harness, Action::Document(DocumentCommand::Source(SourceChoice::Simulated)));
-    wait(&mut harness, "the simulated rig", |w| w.snapshot().span_s.is_none());
-    step(&mut harness, 5);
-    results.extend_harness(&mut harness);
 }
 
 /// An experiment chosen and run in its pane comes out as its file expects.
