@@ -92,11 +92,20 @@ pub fn with_unit(channel: &Channel) -> String {
 
 fn write(columns: &Columns, path: &Path) -> Result<(), FileError> {
     let failed = |reason: String| FileError::Write { path: path.display().to_string(), reason };
-    match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
-        Some("csv") => write_csv(columns, path).map_err(|error| failed(error.to_string())),
-        Some("parquet") => write_parquet(columns, path).map_err(|error| failed(error.to_string())),
-        _ => Err(failed("the name must end in .csv or .parquet".to_owned())),
-    }
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".writing");
+    let beside = Path::new(&beside);
+    let written = match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
+        Some("csv") => write_csv(columns, beside).map_err(|error| error.to_string()),
+        Some("parquet") => write_parquet(columns, beside).map_err(|error| error.to_string()),
+        _ => return Err(failed("the name must end in .csv or .parquet".to_owned())),
+    };
+    // A disk that is full must not cost the file that was there.
+    let placed = written.and_then(|()| std::fs::rename(beside, path).map_err(|error| error.to_string()));
+    placed.map_err(|reason| {
+        drop(std::fs::remove_file(beside));
+        failed(reason)
+    })
 }
 
 /// Sample times are multiples of the sample time; nine decimals hide the rounding of the product.

@@ -14,7 +14,10 @@ use vasos_engine::signal::SampleBlock;
 use vasos_engine::sim::ClosedLoop;
 use vasos_io::export::write_rows;
 use vasos_io::log::{ImportOptions, open_log};
-use vasos_io::recording::{ModelNote, Note, Parts, Recording, RecordingError, RecordingOptions, read_runs};
+use vasos_io::recording::{
+    ModelNote, Note, Parts, Recording, RecordingError, RecordingFlaw, RecordingOptions, RecordingTrouble,
+    read_recorded, read_runs,
+};
 use vasos_io::rig::{PRESETS, preset};
 
 const FILE_ONLY: RecordingOptions = RecordingOptions { serve: false, port: None, part_bytes: None };
@@ -373,4 +376,137 @@ fn a_recording_goes_out_as_csv_and_parquet_with_units_and_comes_back() {
     }
     let error = write_rows(&run.rows, &folder.path().join("run.txt")).expect_err("no such kind");
     assert!(error.to_string().contains(".parquet"), "{error}");
+}
+
+/// Single bits flipped all over a file: every one is read or refused in words. Nothing panics, nothing reserves memory that
+/// is not there, and what cannot be read is said.
+#[test]
+fn a_bit_that_flipped_costs_its_message_and_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.rrd");
+    long_run(&path, 400, FILE_ONLY, Duration::ZERO);
+    let bytes = std::fs::read(&path).expect("a file");
+    let damaged = folder.path().join("damaged.rrd");
+    let (mut said, mut refused, mut fewer_unsaid) = (0, 0, 0);
+    let stride = bytes.len() / 160;
+    for k in 0..160 {
+        let (at, bit) = (k * stride + (k * 7919) % stride, k % 8);
+        let mut flipped = bytes.clone();
+        flipped[at] ^= 1 << bit;
+        std::fs::write(&damaged, &flipped).expect("written");
+        match read_recorded(&Parts(vec![damaged.clone()])) {
+            Ok(recorded) => {
+                let rows: usize = recorded.runs.iter().map(RecordedRun::len).sum();
+                said += usize::from(!recorded.flaws.is_empty());
+                fewer_unsaid += usize::from(rows < 400 && recorded.flaws.is_empty());
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(!error.to_string().is_empty());
+            }
+        }
+        drop(open_log(&damaged, &ImportOptions::default()));
+    }
+    println!("160 bits: {said} said, {refused} refused, {fewer_unsaid} with fewer rows and nothing said");
+    assert!(said + refused > 40, "{said} {refused}");
+    assert_eq!(fewer_unsaid, 0);
+}
+
+#[test]
+fn rows_that_are_missing_are_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.rrd");
+    let start = RunStart::of(&loops("stad"), 0);
+    let (recording, mut sink) = Recording::start(&path, FILE_ONLY).expect("records");
+    sink.started(&start);
+    let width = start.channels.len();
+    for from in [0, 300] {
+        let time_s: Vec<f64> = (from..from + 100).map(|row| f64::from(row) * 0.2).collect();
+        let channels = start.channels.clone();
+        sink.samples(&SampleBlock { run: 0, channels, time_s, values: vec![1.0; 100 * width] });
+    }
+    drop(sink);
+    recording.close().expect("closes");
+    let recorded = read_recorded(&Parts::of(&path)).expect("reads");
+    let [RecordingFlaw::Gap { from_s, missing_s, gaps, .. }] = &recorded.flaws[..] else {
+        panic!("{:?}", recorded.flaws)
+    };
+    assert!((from_s - 19.8).abs() < 1e-9 && (missing_s - 40.2).abs() < 1e-6 && *gaps == 1);
+    let log = open_log(&path, &ImportOptions::default()).expect("opens");
+    assert!(log.report.repairs.iter().any(|r| matches!(r, vasos_io::log::Repair::Recording { .. })));
+}
+
+#[test]
+fn a_file_belongs_to_one_recorder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.rrd");
+    let start = RunStart::of(&loops("stad"), 0);
+    let (first, mut sink) = Recording::start(&path, FILE_ONLY).expect("records");
+    sink.started(&start);
+    let Err(RecordingError::Create { reason, .. }) = Recording::start(&path, FILE_ONLY) else {
+        panic!("a second recorder on one file")
+    };
+    assert!(reason.contains("another recorder"), "{reason}");
+    drop(sink);
+    first.close().expect("closes");
+    assert_eq!(read_runs(&Parts::of(&path)).expect("reads").len(), 1, "the first is not harmed");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_is_taken_away_is_begun_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.rrd");
+    let session = Session::of(loops("stad"), Box::new(|| ()));
+    let (mut recording, sink) = Recording::start(&path, FILE_ONLY).expect("records");
+    assert!(session.send(SessionCommand::Attach { id: recording.id(), sink }));
+    assert!(session.send(SessionCommand::Speed(50.0)));
+    assert!(session.send(SessionCommand::Run));
+    std::thread::sleep(Duration::from_millis(1500));
+    std::fs::remove_file(&path).expect("removed");
+    std::thread::sleep(Duration::from_millis(2500));
+    let told = recording.troubles();
+    assert!(told.iter().any(|t| matches!(t, RecordingTrouble::Removed { .. })), "{told:?}");
+    assert!(recording.unwritten() > 0);
+    close(&session, recording);
+    assert!(only_run(&path).len() > 50);
+}
+
+/// A plan carries commands out before the sample of their time, at any speed: the run is that of the scenario.
+#[test]
+fn a_scenario_at_any_speed_is_the_scenario() {
+    use vasos_engine::sim::{Scenario, ScenarioEvent, run_scenario, scenario_loop};
+    let network = preset("stad").expect("preset");
+    let at = |at_s: f64, level_cm: f64| ScenarioEvent {
+        at_s,
+        command: RigCommand::Setpoint { tag: tag(), level_cm },
+    };
+    let scenario = Scenario {
+        schema: 1,
+        rig: "stad".to_owned(),
+        configuration: None,
+        duration_s: 300.0,
+        seed: 3,
+        measurement: Measurement::DEFAULT,
+        keep_every: 1,
+        start: Default::default(),
+        events: vec![at(200.0, 13.0), at(50.0, 17.0)],
+    };
+    let expected = run_scenario(network.clone(), &scenario).expect("runs");
+    let session = Session::of(scenario_loop(&network, &scenario).expect("starts"), Box::new(|| ()));
+    assert!(session.send(SessionCommand::Plan { events: scenario.events.clone(), end_s: Some(300.0) }));
+    assert!(session.send(SessionCommand::Speed(1000.0)));
+    assert!(session.send(SessionCommand::Run));
+    until(&session, |now| now.time_s > 300.0 && !now.running);
+    let mut time_s = vec![];
+    let mut values = vec![];
+    let limit = Instant::now() + Duration::from_secs(5);
+    while time_s.len() < expected.time_s.len() && Instant::now() < limit {
+        for block in session.samples() {
+            time_s.extend(block.time_s);
+            values.extend(block.values);
+        }
+    }
+    assert_eq!(time_s, expected.time_s);
+    assert!(values.iter().zip(&expected.values).all(|(a, b)| a.to_bits() == b.to_bits()));
 }

@@ -24,7 +24,7 @@ use vasos_engine::tune::{RuleError, RuleWarning, registry};
 use vasos_io::frequency_response::FrequencyFileError;
 use vasos_io::log::{ImportError, Repair};
 use vasos_io::recording::viewer::ViewerError;
-use vasos_io::recording::{RecordingError, RecordingTrouble};
+use vasos_io::recording::{RecordingError, RecordingFlaw, RecordingTrouble};
 use vasos_io::rig::FileError;
 use vasos_io::settings::SettingsTrouble;
 use vasos_tests::{root, sources};
@@ -231,6 +231,7 @@ fn findings() -> Vec<(&'static str, Vec<Box<dyn Explain>>)> {
         ("ExcitationWarning", boxed(ExcitationWarning::samples())),
         ("DocumentError", boxed(DocumentError::samples())),
         ("ScenarioError", boxed(scenario)),
+        ("RecordingFlaw", boxed(RecordingFlaw::samples())),
         ("ViewerError", boxed(ViewerError::samples())),
         ("FitError", boxed(FitError::samples())),
         ("ReactionCurveError", boxed(ReactionCurveError::samples())),

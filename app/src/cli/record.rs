@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
+use vasos_engine::explain::number;
 use vasos_engine::plant::{Measurement, Network};
 use vasos_engine::session::{EventKind, Session, SessionCommand};
 use vasos_engine::sim::{ClosedLoop, ScenarioEvent, scenario_loop};
@@ -69,16 +70,16 @@ struct Task {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
-    let number = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
+    let within = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
         if range.contains(&value) {
             return Ok(());
         }
         Err(Refusal(format!("--{name} {value}: expected {} to {}", range.start(), range.end())))
     };
-    number("speed", arguments.speed, 1.0..=1000.0)?;
-    number("part-mb", arguments.part_mb, 0.0..=1e6)?;
+    within("speed", arguments.speed, 1.0..=1000.0)?;
+    within("part-mb", arguments.part_mb, 0.0..=1e6)?;
     if let Some(duration_s) = arguments.duration {
-        number("duration", duration_s, 0.0..=1e9)?;
+        within("duration", duration_s, 0.0..=1e9)?;
     }
     let is_recording = |p: &Path| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("rrd"));
     if !is_recording(&arguments.output) {
@@ -89,6 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let asked = stop.clone();
     // A second call within one process, as tests make it, keeps the first handler.
     drop(ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)));
+    survive_file_limits();
     record(arguments, task, &stop)
 }
 
@@ -101,10 +103,8 @@ fn task(arguments: &Arguments) -> Result<Task, Refusal> {
         }
         let (scenario, network) = load_scenario(Path::new(&arguments.rig)).map_err(Refusal::of)?;
         let closed = scenario_loop(&network, &scenario).map_err(Refusal::of)?;
-        let mut events = scenario.events.clone();
-        events.sort_by(|a, b| b.at_s.total_cmp(&a.at_s));
         let duration_s = arguments.duration.or(Some(scenario.duration_s));
-        return Ok(Task { closed, events, duration_s });
+        return Ok(Task { closed, events: scenario.events, duration_s });
     }
     let network = load_rig(&arguments.rig).map_err(Refusal::of)?;
     let configuration = configuration(&network, arguments.configuration.as_deref())?;
@@ -126,8 +126,7 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     let part_bytes = (arguments.part_mb > 0.0).then_some((arguments.part_mb * MEGABYTE as f64) as u64);
     let options = RecordingOptions { serve: !arguments.no_viewer, port: arguments.port, part_bytes };
     let (mut recording, sink) = Recording::start(&arguments.output, options).map_err(Refusal::of)?;
-    let Task { closed, mut events, duration_s } = task;
-    let sample_time_s = closed.sample_time_s();
+    let Task { closed, events, duration_s } = task;
     let session = Session::of(closed, Box::new(|| {}));
     if let Some(address) = recording.address() {
         eprintln!(
@@ -140,25 +139,25 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     };
     send(SessionCommand::Attach { id: recording.id(), sink })?;
     send(SessionCommand::Speed(arguments.speed))?;
-    send_due(&mut events, 0.0, &send)?;
+    send(SessionCommand::Plan { events, end_s: duration_s })?;
     send(SessionCommand::Run)?;
-    let mut refusals = 0;
+    let (mut refusals, mut begun) = (0, false);
     loop {
         std::thread::sleep(TICK);
         session.samples().for_each(drop);
         for event in session.events() {
             if matches!(event.kind, EventKind::Refused(_) | EventKind::Stopped { .. }) {
                 refusals += 1;
-                eprintln!("vasos: at {} s, {}", event.time_s, event_words(&event.kind).1);
+                eprintln!("vasos: at {} s, {}", number(event.time_s), event_words(&event.kind).1);
             }
         }
         for trouble in recording.troubles() {
             eprintln!("vasos: {trouble}");
         }
         let now = session.snapshot();
-        send_due(&mut events, now.time_s, &send)?;
-        let over = duration_s.is_some_and(|duration_s| now.time_s >= duration_s + 0.5 * sample_time_s);
-        if over || stop.load(Ordering::Relaxed) {
+        begun |= now.running;
+        // At its end the run stands still by itself.
+        if begun && !now.running || stop.load(Ordering::Relaxed) {
             break;
         }
     }
@@ -168,15 +167,16 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     while session.snapshot().running && Instant::now() < limit {
         std::thread::sleep(TICK);
     }
-    let end_time_s = session.snapshot().time_s;
+    // Sample times are multiples of the sample time: nine decimals hide the rounding.
+    let end_time_s = (session.snapshot().time_s * 1e9).round() / 1e9;
     drop(session);
-    let (rows, lost) = (recording.rows(), recording.lost());
-    let files = recording.parts();
+    let tally = recording.tally();
     for trouble in recording.troubles() {
         eprintln!("vasos: {trouble}");
     }
-    let unwritten = recording.unwritten();
     let closed = recording.close();
+    // The last rows may have begun another file, or found the disk full.
+    let (rows, lost, unwritten, files) = (tally.rows(), tally.lost(), tally.unwritten(), tally.parts());
     let bytes: u64 = files.iter().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
     let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
     let text = if arguments.json {
@@ -192,14 +192,8 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     Ok(Answer { text, remarks, status })
 }
 
-/// Sends the commands of a scenario whose time has come; they wait in falling order of time.
-fn send_due(
-    events: &mut Vec<ScenarioEvent>,
-    now_s: f64,
-    send: &impl Fn(SessionCommand) -> Result<(), Refusal>,
-) -> Result<(), Refusal> {
-    while let Some(event) = events.pop_if(|event| event.at_s <= now_s) {
-        send(SessionCommand::Rig(event.command))?;
-    }
-    Ok(())
+/// A file that may not grow is an error of its write, no reason to die: what is recorded after it matters as well.
+fn survive_file_limits() {
+    #[cfg(unix)]
+    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
 }

@@ -10,7 +10,7 @@ use vasos_engine::control::LoopSpec;
 use vasos_engine::session::{RecordedRun, Session, SessionCommand};
 use vasos_io::export::{with_unit, write_rows};
 use vasos_io::recording::viewer::{self, Shown};
-use vasos_io::recording::{Parts, event_words, read_runs};
+use vasos_io::recording::{Parts, Recorded, event_words, read_recorded};
 
 use super::json::{self, shown, table};
 use super::{Answer, Refusal};
@@ -27,8 +27,9 @@ Examples:
   vasos replay run.rrd -o run.parquet      its columns, with units (or run.csv)
   vasos replay run.rrd --speed 10          its rows as CSV on standard output, ten times as fast as they came
   vasos replay run.rrd --open              in Rerun's viewer
-A recording that goes on in several files (run.rrd, run-2.rrd, …) is read as one. To see it on the rig: vasos run.rrd
-JSON: {files, runs: [{run, name, rig, configuration, rows, from_s, to_s, columns: [{name, unit}], loops: [{loop, law, mode,
+A recording that goes on in several files (run.rrd, run-2.rrd, …) is read as one. What is missing in it or damaged is said on
+standard error, and the exit status is 1 then. To see it on the rig: vasos run.rrd
+JSON: {files, flaws, runs: [{run, name, rig, configuration, rows, from_s, to_s, columns: [{name, unit}], loops: [{loop, law, mode,
 setpoint_cm, Kc, Ti_s, Td_s}], events: [{time_s, what}], models: [{time_s, model, pv_unit, mv_unit}]}]}.")]
 pub struct Arguments {
     /// Recording (.rrd).
@@ -54,11 +55,20 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
-    let parts = Parts::of(&arguments.recording);
-    let runs = read_runs(&parts).map_err(Refusal::of)?;
+    let recorded = read_recorded(&Parts::of(&arguments.recording)).map_err(Refusal::of)?;
+    let flaws: Vec<String> = recorded.flaws.iter().map(ToString::to_string).collect();
+    let mut answer = answer(arguments, &recorded, &flaws)?;
+    // What is missing is an answer of its own.
+    answer.status = answer.status.max(u8::from(!flaws.is_empty()));
+    answer.remarks.extend(flaws);
+    Ok(answer)
+}
+
+fn answer(arguments: &Arguments, recorded: &Recorded, flaws: &[String]) -> Result<Answer, Refusal> {
+    let Recorded { runs, files, .. } = recorded;
     if arguments.open {
         let program = viewer::find().map_err(Refusal::of)?;
-        viewer::open_with(&program, &Shown::Files(parts.0)).map_err(Refusal::of)?;
+        viewer::open_with(&program, &Shown::Files(files.clone())).map_err(Refusal::of)?;
         return Ok(Answer::done(format!("opened in {}", program.display())));
     }
     let one = match arguments.run {
@@ -82,14 +92,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
             runs[index].channels().len(),
             path.display()
         );
+        if arguments.json {
+            let shown =
+                json!({ "run": index + 1, "rows": runs[index].len(), "output": path.display().to_string() });
+            return Ok(Answer::done(json::text(&shown)));
+        }
         return Ok(Answer::done(text));
     }
     let chosen: Vec<(usize, &RecordedRun)> =
         runs.iter().enumerate().filter(|(i, _)| one.is_none_or(|one| one == *i)).collect();
     if arguments.json {
-        let files: Vec<String> = parts.0.iter().map(|f| f.display().to_string()).collect();
+        let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
         let runs: Vec<Value> = chosen.iter().map(|(i, run)| run_json(i + 1, run)).collect();
-        return Ok(Answer::done(json::text(&json!({ "files": files, "runs": runs }))));
+        return Ok(Answer::done(json::text(&json!({ "files": files, "flaws": flaws, "runs": runs }))));
     }
     let text: Vec<String> =
         chosen.iter().map(|(i, run)| run_text(i + 1, run, &arguments.recording, arguments.events)).collect();

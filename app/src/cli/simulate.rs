@@ -194,8 +194,13 @@ fn write_recording(
     let options = RecordingOptions { serve: false, ..RecordingOptions::default() };
     let (recording, mut sink) = Recording::start(path, options).map_err(Refusal::of)?;
     sink.started(&RunStart::of(&scenario_loop(network, scenario).map_err(Refusal::of)?, 0));
-    for event in &scenario.events {
+    let carried_out = scenario.events.iter().filter(|event| event.at_s <= scenario.duration_s);
+    for event in carried_out {
         sink.event(&Event { run: 0, time_s: event.at_s, kind: EventKind::Done(event.command.clone()) });
+    }
+    for report in &run.excitations {
+        let time_s = report.start_s + report.record.time_s.last().copied().unwrap_or(0.0);
+        sink.event(&Event { run: 0, time_s, kind: EventKind::ExcitationEnded(Arc::new(report.clone())) });
     }
     let width = run.channels.len();
     for (time_s, values) in run.time_s.chunks(BLOCK).zip(run.values.chunks(BLOCK * width)) {

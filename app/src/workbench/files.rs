@@ -8,7 +8,7 @@ use vasos_engine::document::{DocumentCommand, LogRoles};
 use vasos_engine::experiment::ExperimentEnd;
 use vasos_io::experiment::load_experiment;
 use vasos_io::log::{DateOrder, ImportError, ImportOptions, ImportedLog, Repair, open_log, open_logs};
-use vasos_io::recording::{Parts, RecordingError, read_runs};
+use vasos_io::recording::{Parts, RecordingError, read_recorded};
 use vasos_io::rig::{FileError, load_rig};
 
 use super::Workbench;
@@ -51,9 +51,8 @@ impl ImportSheet {
 /// Reads a file in a job: a rig or an experiment when it ends in `.toml`, else a log.
 pub fn read(path: &Path, options: &ImportOptions) -> Outcome {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("rrd")) {
-        let parts = Parts::of(path);
-        match read_runs(&parts) {
-            Ok(runs) => return Outcome::Runs(parts.0, runs.into_iter().map(Arc::new).collect()),
+        match read_recorded(&Parts::of(path)) {
+            Ok(recorded) => return Outcome::Runs(Box::new(recorded)),
             // A recording of something else has numbers all the same.
             Err(RecordingError::NoRig { .. }) => {}
             Err(error) => return Outcome::Failed(Box::new(error)),
@@ -136,7 +135,7 @@ impl Workbench {
     pub(super) fn take_results(&mut self, ctx: &egui::Context) {
         for outcome in self.jobs.results().into_iter().chain(self.beside.results()) {
             match outcome {
-                Outcome::Runs(files, runs) => self.take_runs(ctx, files, runs),
+                Outcome::Runs(recorded) => self.take_runs(ctx, *recorded),
                 Outcome::Log(paths, log, options) => {
                     let words = tr!("import_sheet.read", name = log.table.name, rows = log.table.len());
                     self.tell(Weight::Note, words);

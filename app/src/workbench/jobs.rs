@@ -10,8 +10,8 @@ use vasos_engine::document::NewModel;
 use vasos_engine::experiment::Experiment;
 use vasos_engine::explain::Explain;
 use vasos_engine::plant::Network;
-use vasos_engine::session::RecordedRun;
 use vasos_io::log::{ImportOptions, ImportedLog};
+use vasos_io::recording::Recorded;
 
 use crate::answers::{Question, Reply};
 use crate::experiments::Finished;
@@ -26,8 +26,8 @@ pub type Said = Box<dyn Explain + Send>;
 pub enum Outcome {
     /// A log was read.
     Log(Vec<PathBuf>, Box<ImportedLog>, ImportOptions),
-    /// The runs of a recording were read, with the files they are in.
-    Runs(Vec<PathBuf>, Vec<Arc<RecordedRun>>),
+    /// A recording was read.
+    Runs(Box<Recorded>),
     /// A rig was read.
     Rig(PathBuf, Arc<Network>),
     /// A model was fitted.

@@ -1,7 +1,6 @@
 //! Recordings in the window: opened, played with the simulated rig parked meanwhile, shown in Rerun, and told of models
 //! and loops while they run.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use eframe::egui::{self, RichText};
@@ -9,7 +8,7 @@ use vasos_engine::analyze::{CurveOptions, LoopFunction, OpenLoop, frequency_curv
 use vasos_engine::document::{Document, DocumentCommand, SourceChoice};
 use vasos_engine::session::{RecordedRun, Session, SessionCommand, Snapshot};
 use vasos_io::recording::viewer::{self, Shown};
-use vasos_io::recording::{ModelNote, Note, NyquistNote};
+use vasos_io::recording::{ModelNote, Note, NyquistNote, Recorded};
 
 use super::Workbench;
 use crate::action::Action;
@@ -36,17 +35,15 @@ pub(super) struct Noted {
 
 impl Workbench {
     /// Takes the runs of a recording: one is played at once, of several one is chosen.
-    pub(super) fn take_runs(
-        &mut self,
-        ctx: &egui::Context,
-        files: Vec<PathBuf>,
-        runs: Vec<Arc<RecordedRun>>,
-    ) {
-        if let Some(first) = files.first() {
+    pub(super) fn take_runs(&mut self, ctx: &egui::Context, recorded: Recorded) {
+        if let Some(first) = recorded.files.first() {
             self.settings.remember(first.clone());
         }
-        self.recorded = files;
-        self.runs = runs;
+        for flaw in &recorded.flaws {
+            self.tell(Weight::Caution, i18n::say(flaw));
+        }
+        self.recorded = recorded.files;
+        self.runs = recorded.runs.into_iter().map(Arc::new).collect();
         if self.runs.len() > 1 {
             self.choosing_run = true;
         } else {

@@ -28,7 +28,7 @@ pub use snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 
 use crate::plant::{Measurement, Network};
 use crate::signal::SampleBlock;
-use crate::sim::ClosedLoop;
+use crate::sim::{ClosedLoop, ScenarioEvent};
 use replay::Player;
 use worker::{Ports, Worker};
 
@@ -65,6 +65,14 @@ pub enum SessionCommand {
     Speed(f64),
     /// Go to a time of the recording that is played, in seconds of its run.
     Seek(f64),
+    /// Carry commands out at their times in seconds of the run, and stand still at an end: each before the first sample
+    /// at or after its time, as a scenario has them.
+    Plan {
+        /// Commands, in any order; they take the place of those of a plan before.
+        events: Vec<ScenarioEvent>,
+        /// Time of the last sample in seconds; `None` to go on.
+        end_s: Option<f64>,
+    },
     /// Start a new run on a rig.
     Load(Box<Rig>),
     /// Send everything from now on to a sink as well.

@@ -16,7 +16,7 @@ use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
 use super::{Notify, SessionCommand};
 use crate::control::{Bound, ControlOutput, Limits, Mode};
 use crate::daq::ReplayedRig;
-use crate::plant::{Balance, Measurement, ReadingStatus};
+use crate::plant::{Balance, Fault, Measurement, ReadingStatus};
 use crate::signal::{ChannelKind, SampleBlock};
 use crate::sim::{ActiveLoop, ClosedLoop};
 
@@ -132,7 +132,9 @@ impl Player {
             SessionCommand::Speed(speed) if (1.0..=1000.0).contains(&speed) => self.speed = speed,
             SessionCommand::Speed(speed) => self.refuse(CommandError::Speed { speed }),
             SessionCommand::Seek(time_s) => self.seek(time_s.clamp(start_s, end_s)),
-            SessionCommand::Rig(_) | SessionCommand::Load(_) => self.refuse(CommandError::Replay),
+            SessionCommand::Rig(_) | SessionCommand::Load(_) | SessionCommand::Plan { .. } => {
+                self.refuse(CommandError::Replay)
+            }
             SessionCommand::Attach { id, mut sink } => {
                 // A recorder of a recording gets all of it.
                 sink.started(&RunStart::of(&fresh(&self.recorded), self.recorded.rows.run));
@@ -215,7 +217,7 @@ impl Player {
         let tank = |i| TankNow {
             level_cm: value(ChannelKind::Level(i)),
             spill_cm3_s: value(ChannelKind::Spill(i)),
-            leak_cm3_s: 0.0,
+            leak_cm3_s: self.leak_cm3_s(i, value(ChannelKind::Level(i))),
         };
         let pump = |i| {
             let arriving_cm3_s = value(ChannelKind::Arriving(i));
@@ -241,7 +243,12 @@ impl Player {
             tanks: (0..network.tanks.len()).map(tank).collect(),
             pumps: (0..network.pumps.len()).map(pump).collect(),
             valves: (0..network.valves.len()).map(valve).collect(),
-            loops: loops.loops().iter().enumerate().map(|(slot, l)| loop_now(l, numbers(slot))).collect(),
+            loops: loops
+                .loops()
+                .iter()
+                .enumerate()
+                .map(|(slot, l)| loop_now(l, numbers(slot), self.status(l.sensor)))
+                .collect(),
             balance: Balance::default(),
             balance_error_cm3: 0.0,
             alarms: self.alarms.clone(),
@@ -250,6 +257,29 @@ impl Player {
             span_s: Some(recorded.span_s()),
             network,
         }
+    }
+
+    /// What the alarms say of a sensor.
+    fn status(&self, sensor: usize) -> ReadingStatus {
+        let tag = &self.recorded.network.spec.sensors[sensor].id;
+        let of = |alarm: &&Alarm| alarm.tag() == tag;
+        match self.alarms.iter().find(of) {
+            Some(Alarm::SensorFault { .. }) => ReadingStatus::Broken,
+            Some(Alarm::BelowRange { .. }) => ReadingStatus::BelowRange,
+            Some(Alarm::AboveRange { .. }) => ReadingStatus::AboveRange,
+            _ => ReadingStatus::Good,
+        }
+    }
+
+    /// k √h of the leaks that are open.
+    fn leak_cm3_s(&self, tank: usize, level_cm: f64) -> f64 {
+        let tag = &self.recorded.network.spec.tanks[tank].id;
+        let leaks = self.loops.source().faults().iter().filter(|f| f.tag == *tag);
+        let of = |fault: &Fault| match fault {
+            Fault::Leak { k_cm2_5_s } => k_cm2_5_s * level_cm.max(0.0).sqrt(),
+            _ => 0.0,
+        };
+        leaks.map(|f| of(&f.fault)).sum()
     }
 
     fn is_dry(&self, pump: usize) -> bool {
@@ -270,7 +300,7 @@ fn moves_itself(command: &RigCommand) -> bool {
     matches!(command, C::Excite { .. } | C::AbortExcitation { .. } | C::Mv { .. } | C::Bump { .. })
 }
 
-fn loop_now(l: &ActiveLoop, [setpoint_cm, pv_cm, mv]: [f64; 3]) -> LoopNow {
+fn loop_now(l: &ActiveLoop, [setpoint_cm, pv_cm, mv]: [f64; 3], status: ReadingStatus) -> LoopNow {
     let limits = l.control.limits();
     let at_limit = if mv >= limits.high {
         Some(Bound::High)
@@ -287,7 +317,7 @@ fn loop_now(l: &ActiveLoop, [setpoint_cm, pv_cm, mv]: [f64; 3]) -> LoopNow {
         target: l.target,
         outer: l.outer,
         pv_cm,
-        status: ReadingStatus::Good,
+        status,
         setpoint_cm,
         working_setpoint_cm: setpoint_cm,
         mv,

@@ -16,7 +16,7 @@ use crate::control::Limits;
 use crate::excitation::{Progress, StopReason};
 use crate::plant::{Measurement, Plant};
 use crate::signal::SampleBlock;
-use crate::sim::ClosedLoop;
+use crate::sim::{ClosedLoop, ScenarioEvent};
 
 /// Between two looks at the clock while time goes on.
 const TICK: Duration = Duration::from_millis(10);
@@ -45,6 +45,10 @@ pub(super) struct Worker {
     pending_events: Vec<Event>,
     lost_events: usize,
     sinks: Vec<(u64, Box<dyn Sink>)>,
+    /// Commands to come, in falling order of time.
+    planned: Vec<ScenarioEvent>,
+    /// Time of the last sample of a plan.
+    end_s: Option<f64>,
     commands: Receiver<SessionCommand>,
     blocks: Sender<SampleBlock>,
     events: Sender<Event>,
@@ -80,6 +84,8 @@ impl Worker {
             pending_events: vec![],
             lost_events: 0,
             sinks: vec![],
+            planned: vec![],
+            end_s: None,
             commands: ports.commands,
             blocks: ports.blocks,
             events: ports.events,
@@ -155,6 +161,16 @@ impl Worker {
     /// One sample; false when a defect stopped the run.
     fn sample(&mut self) -> bool {
         let time_s = self.closed.time_s();
+        // Sample times are multiples of the sample time, rounded.
+        const NEAR_S: f64 = 1e-9;
+        if self.end_s.is_some_and(|end_s| time_s > end_s + NEAR_S) {
+            self.end_s = None;
+            self.set_running(false);
+            return false;
+        }
+        while let Some(event) = self.planned.pop_if(|event| event.at_s <= time_s + NEAR_S) {
+            self.obey(SessionCommand::Rig(event.command));
+        }
         let outcome = guarded(|| {
             let row = self.closed.step();
             self.fresh.time_s.push(time_s);
@@ -242,6 +258,10 @@ impl Worker {
                     self.say(EventKind::Refused(CommandError::Speed { speed }));
                 }
             }
+            SessionCommand::Plan { mut events, end_s } => {
+                events.sort_by(|a, b| b.at_s.total_cmp(&a.at_s));
+                (self.planned, self.end_s) = (events, end_s);
+            }
             SessionCommand::Seek(_) => self.say(EventKind::Refused(CommandError::NoReplay)),
             SessionCommand::Load(rig) => self.load(&rig),
             SessionCommand::Attach { id, mut sink } => {
@@ -283,6 +303,8 @@ impl Worker {
                 self.hand_to_sinks();
                 self.closed = closed;
                 self.run += 1;
+                // A plan was for the run before.
+                (self.planned, self.end_s) = (vec![], None);
                 self.owed_s = 0.0;
                 self.baseline_cm3 = self.total_cm3();
                 self.alarms = AlarmTable::new(&self.closed);

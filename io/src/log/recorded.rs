@@ -6,7 +6,7 @@ use super::assemble::Source;
 use super::merge::{Point, Series, merge};
 use super::read::{Kind, Read, ReadColumn};
 use super::{FileFormat, ImportError, Repair};
-use crate::recording::{Parts, RecordedColumn, read_recording, read_runs};
+use crate::recording::{Parts, Recorded, RecordedColumn, RecordingError, read_recorded, read_recording};
 use vasos_engine::session::RecordedRun;
 
 /// Names of the values of a loop's component, in their order.
@@ -23,9 +23,14 @@ pub(super) fn is_recording(start: &[u8]) -> bool {
 /// # Errors
 /// [`ImportError::Read`] for a recording that cannot be read or has no numbers in it.
 pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, Source), ImportError> {
-    if let Ok(runs) = read_runs(&Parts::of(path))
+    let recorded = read_recorded(&Parts::of(path));
+    if let Err(error @ (RecordingError::Read { .. } | RecordingError::Nothing { .. })) = &recorded {
+        return Err(ImportError::Read { reason: error.to_string() });
+    }
+    if let Ok(Recorded { runs, flaws, .. }) = recorded
         && let Some(run) = runs.iter().max_by_key(|run| run.len())
     {
+        repairs.extend(flaws.into_iter().map(|flaw| Repair::Recording { flaw }));
         if runs.len() > 1 {
             repairs.push(Repair::OtherRuns { run: run.name.clone(), others: runs.len() - 1 });
         }

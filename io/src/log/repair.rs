@@ -1,7 +1,13 @@
 //! What was not taken from a file as it stands, and where.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use vasos_engine::explain::{Explain, number};
+
+use crate::recording::RecordingFlaw;
+
+fn as_words<S: Serializer>(flaw: &RecordingFlaw, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(flaw)
+}
 
 /// Something in the file that was not taken as it stands. Lines are counted from 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -193,6 +199,12 @@ pub enum Repair {
         /// How many others.
         others: usize,
     },
+    /// Something missing in a recording, or damaged.
+    Recording {
+        /// What.
+        #[serde(serialize_with = "as_words")]
+        flaw: RecordingFlaw,
+    },
     /// A further file that the log was made of.
     FileJoined {
         /// Its name.
@@ -344,6 +356,7 @@ impl std::fmt::Display for Repair {
             Self::OtherRuns { run, others } => {
                 write!(f, "of several runs in the recording the longest was taken: {run}; others: {others}")
             }
+            Self::Recording { flaw } => write!(f, "{flaw}"),
             Self::FileJoined { file, line, rows } => {
                 write!(f, "{file} was joined on from row {line} on: {rows} rows")
             }
@@ -398,6 +411,7 @@ impl Explain for Repair {
             Self::Oversampled { .. } => "repair.oversampled",
             Self::OtherSheets { .. } => "repair.other_sheets",
             Self::OtherRuns { .. } => "repair.other_runs",
+            Self::Recording { flaw } => flaw.key(),
             Self::FileJoined { .. } => "repair.file_joined",
             Self::FileMerged { .. } => "repair.file_merged",
             Self::Overlap { .. } => "repair.overlap",
@@ -473,6 +487,7 @@ impl Explain for Repair {
             }
             Self::OtherSheets { sheet, others } => vec![("sheet", sheet.clone()), ("others", others.clone())],
             Self::OtherRuns { run, others } => vec![("run", run.clone()), ("others", others.to_string())],
+            Self::Recording { flaw } => flaw.args(),
             Self::FileJoined { file, line, rows } => {
                 vec![("file", file.clone()), ("line", line.to_string()), ("rows", rows.to_string())]
             }
@@ -532,6 +547,7 @@ impl Repair {
             Self::Oversampled { column, rows: 5, period_s: 2.5 },
             Self::OtherSheets { sheet: "Data".to_owned(), others: "Notes".to_owned() },
             Self::OtherRuns { run: "stad 2".to_owned(), others: 1 },
+            Self::Recording { flaw: RecordingFlaw::Cut { path: file.clone(), at: 12_000 } },
             Self::FileJoined { file: file.clone(), line: 801, rows: 700 },
             Self::FileMerged { file: file.clone(), columns: 2 },
             Self::Appended { file: file.clone(), step_s: 0.2 },

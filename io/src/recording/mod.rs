@@ -16,7 +16,7 @@
 //! | `/models` | `TextDocument`, `model` | the model that came into use: in words, and as TOML with its units | – | as it happens |
 //! | `/fits/model_N` | `Scalars` | PV as measured, PV of the model | the PV's | once a fit |
 //! | `/nyquist/…` | `LineStrips2D`, `Points2D` | L(jω), unit circle, circle of Ms, −1; −Im L points up | 1 | when the loop changes |
-//! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, when a level moves |
+//! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, one in two seconds at real time, when a level moves |
 //! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
 //! | `/__properties/vasos` | text | `rig`, `run`, `program`; `rig_file`: the rig as it was set when the run began, a TOML rig file with the loops' laws, gains, setpoints and modes; `start`: configuration and imperfections | – | once |
 //!
@@ -33,6 +33,7 @@
 //! begins with the blueprint, the drawing, the settings and every command so far. Opened together, in the viewer or by
 //! [`read_runs`], parts are one recording.
 
+mod frames;
 mod layout;
 mod notes;
 mod opening;
@@ -51,8 +52,8 @@ mod writer;
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -62,9 +63,9 @@ use vasos_engine::session::Sink;
 
 pub use layout::{EVENTS, FITS, FLOWS, LEVELS, MODELS, NYQUIST, RIG, SIGNALS, TIME, WALL_CLOCK};
 pub use notes::{ModelNote, Note, NyquistNote};
-pub use play::{Parts, read_runs};
+pub use play::{Parts, Recorded, read_recorded, read_runs};
 pub use read::{RecordedColumn, read_recording};
-pub use trouble::{RecordingError, RecordingTrouble};
+pub use trouble::{RecordingError, RecordingFlaw, RecordingTrouble};
 pub use words::line as event_words;
 
 use output::Output;
@@ -197,6 +198,12 @@ impl Recording {
         self.status.unwritten.load(Ordering::Relaxed)
     }
 
+    /// What can still be asked when the recording is closed.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        Tally(self.status.clone())
+    }
+
     /// Size of the files now, in bytes; those that are full count as they were before they were tidied up.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -241,7 +248,41 @@ impl Recording {
         if let Some(last) = self.parts().last() {
             tidy::tidy(last);
         }
+        let tidying =
+            std::mem::take(&mut *self.status.tidying.lock().unwrap_or_else(PoisonError::into_inner));
+        // A part that is half tidied up would leave its other half behind.
+        tidying.into_iter().for_each(|thread| drop(thread.join()));
         Ok(())
+    }
+}
+
+/// Counts of a recording; they are final when it is closed.
+#[derive(Clone)]
+pub struct Tally(Arc<Status>);
+
+impl Tally {
+    /// Rows handed to the recorder.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.0.rows.load(Ordering::Relaxed)
+    }
+
+    /// Rows that the recorder could not take.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.0.lost.load(Ordering::Relaxed)
+    }
+
+    /// Messages that the file did not take.
+    #[must_use]
+    pub fn unwritten(&self) -> u64 {
+        self.0.unwritten.load(Ordering::Relaxed)
+    }
+
+    /// All files, in order.
+    #[must_use]
+    pub fn parts(&self) -> Vec<PathBuf> {
+        self.0.parts()
     }
 }
 

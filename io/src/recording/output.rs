@@ -3,7 +3,7 @@
 //! One sink for both, rather than Rerun's `MultiSink` of `FileSink` and `GrpcServerSink`: those write on threads of
 //! their own that say nothing of a full disk, and a file cut in the middle of a message would stay so.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,8 @@ use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
 use super::status::Status;
-use super::tidy::tidy_beside;
+use super::tidy::{tidy_beside, tidying_path};
+use super::trouble::RecordingTrouble;
 
 type Encoder = re_log_encoding::Encoder<File>;
 
@@ -80,6 +81,28 @@ impl Output {
         disk.keep = keep;
     }
 
+    /// Notices that the file was taken away, and begins it anew with all that opens the run.
+    pub fn check_there(&self) {
+        let mut disk = self.disk();
+        if disk.is_there() {
+            return;
+        }
+        self.status.report(RecordingTrouble::Removed { path: disk.path.display().to_string() });
+        self.status.unwritten.fetch_add(1, Ordering::Relaxed);
+        let anew = File::create(&disk.path).map_err(|error| error.to_string());
+        let begun = anew.and_then(|file| {
+            let (path, stem) = (disk.path.clone(), disk.stem.clone());
+            Disk::on(file, &path, stem, disk.number, disk.opening.clone())?.opened()
+        });
+        match begun {
+            Ok(begun) => {
+                self.status.bytes.store(begun.good_bytes, Ordering::Relaxed);
+                *disk = begun;
+            }
+            Err(reason) => self.status.report_write(&reason),
+        }
+    }
+
     /// Goes on in a new file when this one has grown over a size; the one that is full is tidied up beside.
     pub fn rotate_over(&self, most_bytes: u64) {
         let mut disk = self.disk();
@@ -101,7 +124,7 @@ impl Output {
         let path = full.path.clone();
         drop(full.file.sync_all());
         drop(full);
-        tidy_beside(path);
+        self.status.tidying.lock().unwrap_or_else(PoisonError::into_inner).extend(tidy_beside(path));
     }
 
     /// Makes sure that the system has all of the file.
@@ -155,7 +178,17 @@ struct Disk {
 
 impl Disk {
     fn create(path: &Path) -> Result<Self, String> {
-        let file = File::create(path).map_err(|error| error.to_string())?;
+        // Emptied only once it is known that nobody else records to it.
+        let file = File::options().write(true).create(true).truncate(false).open(path);
+        let file = file.map_err(|error| error.to_string())?;
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err("another recorder writes to it; choose another name".to_owned());
+        }
+        // A device has no length to cut.
+        if file.metadata().is_ok_and(|m| m.is_file()) {
+            file.set_len(0).map_err(|error| error.to_string())?;
+        }
+        drop(std::fs::remove_file(tidying_path(path)));
         Self::on(file, path, path.with_extension(""), 1, vec![])
     }
 
@@ -187,18 +220,35 @@ impl Disk {
                 Err(error) => return Err(error.to_string()),
             }
         };
-        let made =
-            Self::on(file, &path, self.stem.clone(), number, self.opening.clone()).and_then(|mut part| {
-                let opening = std::mem::take(&mut part.opening);
-                opening.iter().try_for_each(|message| part.append(message).map(drop))?;
-                part.opening = opening;
-                Ok(part)
-            });
+        let made = Self::on(file, &path, self.stem.clone(), number, self.opening.clone());
+        let made = made.and_then(Self::opened);
         if made.is_err() {
             // Half an opening is of no use, and its name is wanted for the next attempt.
             drop(std::fs::remove_file(&path));
         }
         made
+    }
+
+    /// Writes all that opens the run.
+    fn opened(mut self) -> Result<Self, String> {
+        let opening = std::mem::take(&mut self.opening);
+        opening.iter().try_for_each(|message| self.append(message).map(drop))?;
+        self.opening = opening;
+        Ok(self)
+    }
+
+    /// Whether the path still leads to the file that is written.
+    fn is_there(&self) -> bool {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt;
+            let same =
+                |a: &std::fs::Metadata, b: &std::fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+            let (open, named) = (self.file.metadata(), std::fs::metadata(&self.path));
+            open.is_ok_and(|open| named.is_ok_and(|named| same(&open, &named)))
+        }
+        #[cfg(not(unix))]
+        self.path.exists()
     }
 
     fn remember(&mut self, message: &LogMsg) {

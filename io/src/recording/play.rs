@@ -1,26 +1,24 @@
 //! Recordings back as runs: rows, events, settings and models, for a replay or an export.
 //!
-//! The messages of the file are read one after the other, without a store: a file that was cut off gives all that is
-//! whole in it.
+//! The messages of the file are read one after the other, without a store: a file that was cut off or damaged gives all
+//! that is whole in it.
 
 use std::collections::{BTreeMap, HashSet};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rerun::ComponentIdentifier;
 use rerun::external::arrow::array::{Array, Float64Array, ListArray, StringArray};
-use rerun::external::re_log_encoding::Decoder;
 use rerun::log::{Chunk, ChunkId, LogMsg};
 use vasos_engine::plant::{Network, RigSpec};
 use vasos_engine::session::{Event, RecordedModel, RecordedRun};
 use vasos_engine::signal::{ChannelSet, SampleBlock};
 
+use super::frames::{self, Damage};
 use super::layout::{EVENTS, MODELS, SIGNALS, TIME, TOLD, groups};
 use super::notes::MODEL;
 use super::told::{self, Beginning, ToldModel, event_kind};
-use super::trouble::RecordingError;
+use super::trouble::{RecordingError, RecordingFlaw};
 
 /// The files of a recording that goes on in several.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,37 +44,48 @@ impl Parts {
     }
 }
 
-/// Every run of a recording, in the order in which they began; files beside the first that are parts of another
-/// recording are left out.
+/// What is in a recording.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// Every run, in the order in which they began.
+    pub runs: Vec<RecordedRun>,
+    /// The files they are in; others beside the first that have the names of parts are left out.
+    pub files: Vec<PathBuf>,
+    /// What is missing or cannot be read.
+    pub flaws: Vec<RecordingFlaw>,
+}
+
+/// Every run of a recording.
+///
+/// # Errors
+/// As [`read_recorded`].
+pub fn read_runs(parts: &Parts) -> Result<Vec<RecordedRun>, RecordingError> {
+    read_recorded(parts).map(|recorded| recorded.runs)
+}
+
+/// Every run of a recording, its files, and what is wrong with them. What can be read is read.
 ///
 /// # Errors
 /// [`RecordingError::Read`] for a file that cannot be read, [`RecordingError::Nothing`] for one without a run,
 /// [`RecordingError::NoRig`] for a recording of something else.
-pub fn read_runs(parts: &Parts) -> Result<Vec<RecordedRun>, RecordingError> {
+pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
     let first = parts.0.first().map(|p| p.display().to_string()).unwrap_or_default();
     let mut stores: Vec<Store> = vec![];
     let mut known: BTreeMap<String, usize> = BTreeMap::new();
+    let mut damages: Vec<(usize, Damage)> = vec![];
     for (place, path) in parts.0.iter().enumerate() {
-        let read = read_messages(path, |id, name, chunk| {
+        let read = read_messages(path, |id, chunk| {
             // A part holds runs of the first file and those that began after it.
-            let index = match known.get(id) {
-                Some(&index) => index,
-                None => {
-                    known.insert(id.to_owned(), stores.len());
-                    stores.push(Store { part: place, ..Store::default() });
-                    stores.len() - 1
-                }
-            };
-            let store = &mut stores[index];
-            if let Some(name) = name {
-                name.clone_into(&mut store.name);
-            }
+            let index = *known.entry(id.to_owned()).or_insert_with(|| {
+                stores.push(Store { part: place, ..Store::default() });
+                stores.len() - 1
+            });
             if let Some(chunk) = chunk {
-                store.take(&chunk, place);
+                stores[index].take(&chunk, place);
             }
         });
         match read {
-            Ok(()) => {}
+            Ok(damage) => damages.push((place, damage)),
             Err(reason) if place == 0 => return Err(RecordingError::Read { path: first, reason }),
             // What is beside a recording may be anything.
             Err(_) => {}
@@ -85,19 +94,50 @@ pub fn read_runs(parts: &Parts) -> Result<Vec<RecordedRun>, RecordingError> {
     if stores.is_empty() {
         return Err(RecordingError::Nothing { path: first });
     }
-    let belongs = belonging(&stores);
+    let used = used_parts(&stores);
+    let shown = |place: usize| parts.0[place].display().to_string();
+    let mut flaws: Vec<RecordingFlaw> = damages
+        .into_iter()
+        .filter(|(place, damage)| used.contains(place) && damage.messages > 0)
+        .map(|(place, damage)| {
+            let at = damage.at.unwrap_or_default();
+            match damage {
+                Damage { cut: true, messages: 1, .. } => RecordingFlaw::Cut { path: shown(place), at },
+                _ => RecordingFlaw::Damaged { path: shown(place), at, messages: damage.messages },
+            }
+        })
+        .collect();
     let mut runs = vec![];
-    for store in stores.into_iter().zip(belongs).filter(|(_, belongs)| *belongs).map(|(store, _)| store) {
+    for store in stores.into_iter().filter(|store| used.contains(&store.part)) {
         if let Some(run) = store.run(&first)? {
+            flaws.extend(gap(&run));
             runs.push(run);
         }
     }
-    if runs.is_empty() { Err(RecordingError::NoRig { path: first }) } else { Ok(runs) }
+    if runs.is_empty() {
+        return Err(RecordingError::NoRig { path: first });
+    }
+    let files = parts.0.iter().enumerate().filter(|(place, _)| used.contains(place));
+    Ok(Recorded { runs, files: files.map(|(_, file)| file.clone()).collect(), flaws })
 }
 
-/// Which runs are of the recording that the first file begins: those in it, and those of a later part in which a run
-/// that belongs goes on.
-fn belonging(stores: &[Store]) -> Vec<bool> {
+/// Rows that are missing in the middle of a run: a disk that was full, a part that is not there.
+fn gap(run: &RecordedRun) -> Option<RecordingFlaw> {
+    let time_s = &run.rows.time_s;
+    let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
+    let gaps: Vec<usize> = {
+        let mut sorted = steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied()?;
+        (0..steps.len()).filter(|&i| steps[i] > 2.5 * usual).collect()
+    };
+    let first = *gaps.first()?;
+    let missing_s = gaps.iter().map(|&i| std::mem::take(&mut steps[i])).sum();
+    Some(RecordingFlaw::Gap { run: run.name.clone(), from_s: time_s[first], missing_s, gaps: gaps.len() })
+}
+
+/// The parts of the recording that the first file begins: those in which a run of it goes on.
+fn used_parts(stores: &[Store]) -> HashSet<usize> {
     let mut parts: HashSet<usize> = HashSet::from([0]);
     loop {
         let before = parts.len();
@@ -107,36 +147,32 @@ fn belonging(stores: &[Store]) -> Vec<bool> {
             }
         }
         if parts.len() == before {
-            break;
+            return parts;
         }
     }
-    stores.iter().map(|store| parts.contains(&store.part)).collect()
 }
 
-/// Hands over what each message is of: the id of its recording, its name where it opens, its chunk where it is one.
-fn read_messages(path: &Path, mut take: impl FnMut(&str, Option<&str>, Option<Chunk>)) -> Result<(), String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let messages =
-        Decoder::<LogMsg>::decode_eager(BufReader::new(file)).map_err(|error| error.to_string())?;
-    for message in messages {
-        // The rest of a file that was cut off.
-        let Ok(message) = message else { return Ok(()) };
+/// Hands over what each message is of: the id of its recording, and its chunk where it is one.
+fn read_messages(path: &Path, mut take: impl FnMut(&str, Option<Chunk>)) -> Result<Damage, String> {
+    let mut unreadable = 0;
+    let mut damage = frames::read(path, |message| {
         let id = message.store_id().clone();
         if !id.is_recording() {
-            continue;
+            return;
         }
         let id = id.recording_id().to_string();
         match &message {
-            LogMsg::SetStoreInfo(_) => take(&id, None, None),
-            LogMsg::ArrowMsg(_, arrow) => {
-                if let Ok(chunk) = Chunk::from_arrow_msg(arrow) {
-                    take(&id, None, Some(chunk));
-                }
-            }
+            LogMsg::SetStoreInfo(_) => take(&id, None),
+            // Arrow panics on columns that do not fit together.
+            LogMsg::ArrowMsg(_, arrow) => match frames::quietly(|| Chunk::from_arrow_msg(arrow)) {
+                Some(Ok(chunk)) => take(&id, Some(chunk)),
+                _ => unreadable += 1,
+            },
             LogMsg::BlueprintActivationCommand(_) => {}
         }
-    }
-    Ok(())
+    })?;
+    damage.messages += unreadable;
+    Ok(damage)
 }
 
 /// Rows of the signals out of one chunk.

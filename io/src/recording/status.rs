@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
 
 use super::trouble::RecordingTrouble;
 
@@ -29,6 +30,8 @@ pub(super) struct Status {
     pub closing: AtomicBool,
     writing_fails: AtomicBool,
     troubles: Mutex<Vec<RecordingTrouble>>,
+    /// Threads that tidy full parts up.
+    pub tidying: Mutex<Vec<JoinHandle<()>>>,
     parts: Mutex<Vec<PathBuf>>,
     part_fails: AtomicBool,
 }

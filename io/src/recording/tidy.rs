@@ -1,9 +1,17 @@
 //! Tidying a finished file up: larger chunks and a footer.
 
 use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 
 /// A file larger than this is not optimised: that takes it into memory as a whole.
 const OPTIMISE_BYTES: u64 = 64 * 1024 * 1024;
+
+/// The file that is written while one is tidied up.
+pub(super) fn tidying_path(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".optimising");
+    PathBuf::from(beside)
+}
 
 /// Rewrites a finished file of moderate size with larger chunks and a footer; on any doubt it stays as it is.
 pub(super) fn tidy(path: &Path) {
@@ -11,9 +19,7 @@ pub(super) fn tidy(path: &Path) {
     if size(path) > OPTIMISE_BYTES {
         return;
     }
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".optimising");
-    let beside = PathBuf::from(beside);
+    let beside = tidying_path(path);
     let profile = rerun::rrd::OptimizationProfile::OBJECT_STORE;
     let better = rerun::rrd::optimize_file(path, &beside, &profile).is_ok()
         && (1..=size(path)).contains(&size(&beside));
@@ -23,6 +29,6 @@ pub(super) fn tidy(path: &Path) {
 }
 
 /// The same on a thread of its own; without one the file stays as it is, which is readable.
-pub(super) fn tidy_beside(path: PathBuf) {
-    drop(std::thread::Builder::new().name("vasos-tidying".to_owned()).spawn(move || tidy(&path)));
+pub(super) fn tidy_beside(path: PathBuf) -> Option<JoinHandle<()>> {
+    std::thread::Builder::new().name("vasos-tidying".to_owned()).spawn(move || tidy(&path)).ok()
 }

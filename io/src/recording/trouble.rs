@@ -1,6 +1,6 @@
 //! What can go wrong with a recording: at its start, and while it runs.
 
-use vasos_engine::explain::Explain;
+use vasos_engine::explain::{Explain, number};
 
 /// Why a recording cannot start or be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -60,6 +60,14 @@ pub enum RecordingTrouble {
         /// The system's words.
         reason: String,
     },
+    /// The file was taken away while it was written.
+    #[error(
+        "the recording {path} was removed or renamed while it was written: what it held is not there any more, and the recording goes on in a new file of that name"
+    )]
+    Removed {
+        /// File.
+        path: String,
+    },
     /// A recording that should go on in another file cannot.
     #[error("the recording {path} cannot go on in another file: {reason}; it grows on in the present one")]
     NoPart {
@@ -106,6 +114,81 @@ pub enum RecordingTrouble {
     },
 }
 
+/// What is missing in a recording, or cannot be read; everything else was read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RecordingFlaw {
+    /// The file ends in the middle: of what follows nothing is known.
+    #[error("{path} ends in the middle of a message, at byte {at}: what came after it is missing")]
+    Cut {
+        /// File.
+        path: String,
+        /// Byte.
+        at: u64,
+    },
+    /// Messages that cannot be read.
+    #[error(
+        "{path} is damaged from byte {at} on: {messages} messages cannot be read, and values of others may be wrong"
+    )]
+    Damaged {
+        /// File.
+        path: String,
+        /// First byte.
+        at: u64,
+        /// How many.
+        messages: usize,
+    },
+    /// Rows that are missing between others.
+    #[error("{run}: rows are missing in {gaps} places, {} s in all, the first behind {} s", number(*.missing_s), number(*.from_s))]
+    Gap {
+        /// Name of the run.
+        run: String,
+        /// Time in seconds of the row before the first gap.
+        from_s: f64,
+        /// Length of all gaps in seconds.
+        missing_s: f64,
+        /// How many.
+        gaps: usize,
+    },
+}
+
+impl Explain for RecordingFlaw {
+    fn key(&self) -> &'static str {
+        match self {
+            Self::Cut { .. } => "recording.cut",
+            Self::Damaged { .. } => "recording.damaged",
+            Self::Gap { .. } => "recording.gap",
+        }
+    }
+
+    fn args(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::Cut { path, at } => vec![("path", path.clone()), ("at", at.to_string())],
+            Self::Damaged { path, at, messages } => {
+                vec![("path", path.clone()), ("at", at.to_string()), ("messages", messages.to_string())]
+            }
+            Self::Gap { run, from_s, missing_s, gaps } => vec![
+                ("run", run.clone()),
+                ("from_s", number(*from_s)),
+                ("missing_s", number(*missing_s)),
+                ("gaps", gaps.to_string()),
+            ],
+        }
+    }
+}
+
+impl RecordingFlaw {
+    /// One of each kind, for the test that compares them with the translation files.
+    #[must_use]
+    pub fn samples() -> Vec<Self> {
+        let path = || "run.rrd".to_owned();
+        vec![
+            Self::Cut { path: path(), at: 12_000 },
+            Self::Damaged { path: path(), at: 12_000, messages: 3 },
+            Self::Gap { run: "run · stad · run 1".to_owned(), from_s: 12.0, missing_s: 3.5, gaps: 2 },
+        ]
+    }
+}
+
 impl Explain for RecordingError {
     fn key(&self) -> &'static str {
         match self {
@@ -149,6 +232,7 @@ impl Explain for RecordingTrouble {
             Self::RowsLost { .. } => "recording.rows_lost",
             Self::Write { .. } => "recording.write",
             Self::NoPart { .. } => "recording.no_part",
+            Self::Removed { .. } => "recording.removed",
             Self::Resumed { .. } => "recording.resumed",
             Self::Log { .. } => "recording.log",
             Self::NoServer { .. } => "recording.no_server",
@@ -164,6 +248,7 @@ impl Explain for RecordingTrouble {
                 vec![("path", path.clone()), ("reason", reason.clone())]
             }
             Self::Resumed { path, count } => vec![("path", path.clone()), ("count", count.to_string())],
+            Self::Removed { path } => vec![("path", path.clone())],
             Self::Log { reason } | Self::NoServer { reason } => vec![("reason", reason.clone())],
             Self::NotClosed { path, seconds } => {
                 vec![("path", path.clone()), ("seconds", seconds.to_string())]
@@ -180,6 +265,7 @@ impl RecordingTrouble {
         vec![
             Self::RowsLost { count: 120 },
             Self::Write { path: text("run.rrd"), reason: text("no space left on device") },
+            Self::Removed { path: text("run.rrd") },
             Self::NoPart { path: text("run.rrd"), reason: text("permission denied") },
             Self::Resumed { path: text("run.rrd"), count: 12 },
             Self::Log { reason: text("lengths differ") },

@@ -24,7 +24,7 @@ use super::trouble::RecordingTrouble;
 use super::words;
 
 /// Wall time between two batches.
-const BATCH: Duration = Duration::from_millis(900);
+const BATCH: Duration = Duration::from_millis(950);
 /// Rows that make a batch before its time.
 const MOST_ROWS: usize = 10_000;
 /// Frames of the drawing in a batch.
@@ -41,6 +41,8 @@ struct Run {
     groups: Vec<Group>,
     levels: Vec<usize>,
     tanks: Tanks,
+    /// Batches without a frame of the drawing.
+    still: usize,
 }
 
 pub(super) struct Writer {
@@ -153,7 +155,7 @@ impl Writer {
         let column = |tank| channels.column(ChannelKind::Level(tank));
         let levels = (0..network.tanks.len()).filter_map(column).collect();
         stream.flush_with_timeout(BATCH)?;
-        self.run = Some(Run { stream, channels: channels.clone(), groups, levels, tanks });
+        self.run = Some(Run { stream, channels: channels.clone(), groups, levels, tanks, still: 0 });
         Ok(())
     }
 
@@ -173,6 +175,7 @@ impl Writer {
             }
             self.events.clear();
             self.notes.clear();
+            self.output.check_there();
             if let Some(most) = self.part_bytes {
                 self.output.rotate_over(most);
             }
@@ -219,8 +222,13 @@ impl Run {
     fn log_water(&mut self, rows: &Rows) -> LogResult {
         let width = self.channels.len();
         let count = rows.time_s.len();
-        // At real time a frame a second is smooth enough for water.
-        let frames = if count <= 2 * MOST_FRAMES { 1 } else { MOST_FRAMES };
+        // At real time a frame in two seconds is smooth enough for water.
+        let slow = count <= 2 * MOST_FRAMES;
+        self.still += 1;
+        if slow && self.tanks.is_drawn() && self.still < 2 {
+            return Ok(());
+        }
+        let frames = if slow { 1 } else { MOST_FRAMES };
         let (mut time_s, mut wall_ns) = (vec![], vec![]);
         let (mut centers, mut halves, mut radii, mut lengths) = (vec![], vec![], vec![], vec![]);
         for frame in 0..=frames {
@@ -247,6 +255,7 @@ impl Run {
         if time_s.is_empty() {
             return Ok(());
         }
+        self.still = 0;
         let times = [
             TimeColumn::new_duration_secs(TIME, time_s),
             TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, wall_ns),
