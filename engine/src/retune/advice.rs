@@ -56,6 +56,8 @@ pub enum Advice {
         /// What the change costs, in percent.
         slower_percent: f64,
     },
+    /// The present controller has no integral action.
+    NoIntegral,
     /// The present tuning is not stable with the model.
     PresentUnstable,
     /// The optimum for the model alone is not safe over its uncertainty.
@@ -64,6 +66,13 @@ pub enum Advice {
         controller: ControllerKind,
         /// Models as likely with which its loop is unstable, in percent.
         unstable_percent: f64,
+        /// 95 % quantile of its Ms.
+        ms: f64,
+    },
+    /// The optimum for the model alone is stable over its uncertainty, but not with the robustness asked for.
+    Sensitive {
+        /// Controller it concerns.
+        controller: ControllerKind,
         /// 95 % quantile of its Ms.
         ms: f64,
     },
@@ -130,7 +139,7 @@ impl std::fmt::Display for Advice {
             ),
             Self::Keep { gain_percent } => write!(
                 f,
-                "leave the tuning as it is: it keeps the limits, and the best there is would gain {} % only",
+                "leave the tuning as it is: it keeps the limits, and the best that is safe with what the log tells would gain {} % only",
                 whole(gain_percent)
             ),
             Self::Robuster { ms, slower_percent } => write!(
@@ -139,6 +148,9 @@ impl std::fmt::Display for Advice {
                 n(ms),
                 whole(slower_percent)
             ),
+            Self::NoIntegral => f.write_str(
+                "use the optimal tuning: the present controller has no integral action, so that every load leaves an offset",
+            ),
             Self::PresentUnstable => f.write_str(
                 "retune this loop: its present tuning is not stable with the model; the optimal one is, and keeps the limits",
             ),
@@ -146,6 +158,11 @@ impl std::fmt::Display for Advice {
                 f,
                 "the optimal {controller} for the fitted model alone is not safe: with models that fit the log as well it is unstable in {} % of the cases, and 5 % of them have Ms over {}; the worst of a dozen such models was tuned for instead",
                 n(unstable_percent),
+                n(ms)
+            ),
+            Self::Sensitive { controller, ms } => write!(
+                f,
+                "the optimal {controller} for the fitted model alone is not safe: of the models that fit the log as well, 5 % have Ms over {} with it; the worst of a dozen such models was tuned for instead",
                 n(ms)
             ),
             Self::UncertaintyUnknown => f.write_str(
@@ -192,8 +209,10 @@ impl Explain for Advice {
             Self::Better { .. } => "retune.better",
             Self::Keep { .. } => "retune.keep",
             Self::Robuster { .. } => "retune.robuster",
+            Self::NoIntegral => "retune.no_integral",
             Self::PresentUnstable => "retune.present_unstable",
             Self::Uncertain { .. } => "retune.uncertain",
+            Self::Sensitive { .. } => "retune.sensitive",
             Self::UncertaintyUnknown => "retune.uncertainty_unknown",
             Self::PresentUnsure { .. } => "retune.present_unsure",
             Self::DeadTimeTaken { .. } => "retune.dead_time_taken",
@@ -223,13 +242,18 @@ impl Explain for Advice {
             Self::Uncertain { controller, unstable_percent, ms } => {
                 vec![("controller", controller.to_string()), n("percent", unstable_percent), n("ms", ms)]
             }
+            Self::Sensitive { controller, ms } => {
+                vec![("controller", controller.to_string()), n("ms", ms)]
+            }
             Self::PresentUnsure { explained_percent } => vec![whole("percent", explained_percent)],
             Self::DeadTimeTaken { dead_time_s } => vec![n("dead_time_s", dead_time_s)],
             Self::LargeMove { factor } => vec![n("factor", factor)],
             Self::Restless { mv_move, percent } => vec![n("mv_move", mv_move), whole("percent", percent)],
-            Self::TooUncertain | Self::PresentUnstable | Self::UncertaintyUnknown | Self::IntegratorOnly => {
-                vec![]
-            }
+            Self::TooUncertain
+            | Self::NoIntegral
+            | Self::PresentUnstable
+            | Self::UncertaintyUnknown
+            | Self::IntegratorOnly => vec![],
         }
     }
 
@@ -259,7 +283,9 @@ impl Advice {
             Self::Better { controller, gain_percent: 41.7 },
             Self::Keep { gain_percent: 2.2 },
             Self::Robuster { ms: 2.9, slower_percent: 35.2 },
+            Self::NoIntegral,
             Self::PresentUnstable,
+            Self::Sensitive { controller, ms: 3.1 },
             Self::Uncertain { controller, unstable_percent: 4.5, ms: 3.1 },
             Self::UncertaintyUnknown,
             Self::PresentUnsure { explained_percent: 38.0 },

@@ -63,7 +63,11 @@ fn best_of(
     }
     let (unstable_percent, ms) =
         spread.map_or((0.0, f64::INFINITY), |s| (100.0 * s.unstable_share(), s.ms.high));
-    out.advice.push(Advice::Uncertain { controller: kind, unstable_percent, ms });
+    out.advice.push(if unstable_percent > 0.0 {
+        Advice::Uncertain { controller: kind, unstable_percent, ms }
+    } else {
+        Advice::Sensitive { controller: kind, ms }
+    });
     let family = family(model, &out.draws, &nominal);
     let Ok(gains) = solve(&family, kind, options) else { return Ok(Err(Advice::TooUncertain)) };
     let candidate = Candidate::new(CandidateRule::OptimalFamily, kind, gains, model, &out.draws);

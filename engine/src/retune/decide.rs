@@ -124,6 +124,7 @@ fn decide(
     let (first, recommended) = match (present, gain) {
         (None, _) => (Advice::Best { controller: new.controller }, best),
         (Some(p), _) if !p.analysis.stable => (Advice::PresentUnstable, best),
+        (Some(p), None) if !p.gains.ti_s.is_finite() => (Advice::NoIntegral, best),
         (Some(p), gain) => {
             let within = keeps(p, options) && is_robust(p, options.limits.ms);
             match gain {
@@ -211,7 +212,10 @@ mod tests {
         };
         let out = retuned(400, 2.0, (0.5, 60.0), &loose);
         let family = out.candidates.iter().any(|c| c.rule == CandidateRule::OptimalFamily);
-        let said = out.advice.iter().any(|a| matches!(a, Advice::Uncertain { .. } | Advice::NoModel(_)));
+        let said = out
+            .advice
+            .iter()
+            .any(|a| matches!(a, Advice::Uncertain { .. } | Advice::Sensitive { .. } | Advice::NoModel(_)));
         assert!(said && (family || out.model.is_none()), "{:?}", out.advice);
     }
 

@@ -77,6 +77,8 @@ impl Output {
         let mut disk = self.disk();
         if keep == Keep::Open {
             disk.opening.clear();
+        } else if disk.keep == Keep::Open {
+            disk.opened_bytes = disk.good_bytes;
         }
         disk.keep = keep;
     }
@@ -106,7 +108,8 @@ impl Output {
     /// Goes on in a new file when this one has grown over a size; the one that is full is tidied up beside.
     pub fn rotate_over(&self, most_bytes: u64) {
         let mut disk = self.disk();
-        if disk.good_bytes < most_bytes {
+        // Of a small part the opening would be all.
+        if disk.good_bytes < most_bytes.saturating_add(disk.opened_bytes) {
             return;
         }
         let next = match disk.next_part() {
@@ -171,6 +174,8 @@ struct Disk {
     encoder: Encoder,
     file: File,
     good_bytes: u64,
+    /// Bytes of what opens the run.
+    opened_bytes: u64,
     missing: u64,
     keep: Keep,
     opening: Vec<LogMsg>,
@@ -200,8 +205,18 @@ impl Disk {
         // A footer would grow in memory with every batch for days; optimising at the end adds one.
         encoder.do_not_emit_footer();
         let (path, keep) = (path.to_owned(), Keep::Write);
-        let mut disk =
-            Self { path, stem, number, encoder, file: again, good_bytes: 0, missing: 0, keep, opening };
+        let mut disk = Self {
+            path,
+            stem,
+            number,
+            encoder,
+            file: again,
+            good_bytes: 0,
+            opened_bytes: 0,
+            missing: 0,
+            keep,
+            opening,
+        };
         disk.good_bytes = disk.file.stream_position().unwrap_or_default();
         Ok(disk)
     }
@@ -234,6 +249,7 @@ impl Disk {
         let opening = std::mem::take(&mut self.opening);
         opening.iter().try_for_each(|message| self.append(message).map(drop))?;
         self.opening = opening;
+        self.opened_bytes = self.good_bytes;
         Ok(self)
     }
 

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use vasos_engine::explain::number;
 use vasos_engine::identify::{
-    ControllerFit, CurveMethod, LoopStudy, ModelFit, Parameter, ReactionCurve, Structure,
+    ControllerFit, CurveMethod, FitError, LoopStudy, ModelFit, Parameter, ReactionCurve, Structure,
 };
 use vasos_io::log::ImportedLog;
 
@@ -42,6 +42,26 @@ pub(super) fn of(
         text.push_str(&format!("note: {line}\n"));
     }
     Answer { text, remarks, status }
+}
+
+/// The answer where the log holds still: no model, with the reason.
+pub(super) fn nothing(
+    as_json: bool,
+    chosen: &Chosen,
+    log: &ImportedLog,
+    warnings: Vec<String>,
+    reason: &FitError,
+) -> Answer {
+    let repairs: Vec<String> = crate::cli::logs::repairs(&log.report);
+    let text = if as_json {
+        json::text(&json!({
+            "columns": chosen.json(), "models": [], "chosen": null, "repairs": repairs, "warnings": warnings,
+        }))
+    } else {
+        let notes: String = warnings.iter().chain(&repairs).map(|line| format!("note: {line}\n")).collect();
+        format!("no model: {reason}\n{notes}")
+    };
+    Answer { text, remarks: vec![reason.to_string()], status: 1 }
 }
 
 fn whole(chosen: &Chosen, study: &LoopStudy, repairs: &[String], warnings: &[String]) -> Value {

@@ -52,7 +52,14 @@ pub struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let options = arguments.columns.study_options()?;
     let log = LoadedLog::read(&arguments.logs, &arguments.columns)?;
-    let study = study_loop(&log.record(), &options).map_err(Refusal::of)?;
+    let study = match study_loop(&log.record(), &options) {
+        Ok(study) => study,
+        // The log is readable, and what it says is no.
+        Err(error @ (FitError::ConstantMv { .. } | FitError::ConstantPv { .. })) => {
+            return Ok(answer::nothing(arguments.json, &log.columns, &log.imported, log.warnings(), &error));
+        }
+        Err(error) => return Err(Refusal::of(error)),
+    };
     if let Err(error) = &study.choice
         && !matches!(error, FitError::NothingToFit { .. })
     {
