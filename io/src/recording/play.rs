@@ -282,7 +282,7 @@ impl Store {
         let once: Vec<_> = all.filter(|event| seen.insert(event.clone())).collect();
         let event = |(time, words, told): (i64, String, String)| Event {
             run,
-            time_s: time as f64 * 1e-9,
+            time_s: time as f64 / 1e9,
             kind: event_kind(&told, words),
         };
         once.into_iter().map(event).collect()
@@ -291,7 +291,7 @@ impl Store {
 
 fn recorded_model((time, text): &(i64, String)) -> Option<RecordedModel> {
     let ToldModel { pv_unit, mv_unit, model } = toml::from_str(text).ok()?;
-    Some(RecordedModel { time_s: *time as f64 * 1e-9, model, pv_unit, mv_unit })
+    Some(RecordedModel { time_s: *time as f64 / 1e9, model, pv_unit, mv_unit })
 }
 
 fn list<'a>(chunk: &'a Chunk, component: &str) -> Option<&'a ListArray> {
@@ -350,7 +350,7 @@ fn block(mut parts: Vec<Rows>, network: &Network, run: u64) -> SampleBlock {
                 }
             }
         }
-        time_s.extend(rows.time_ns.iter().map(|&ns| ns as f64 * 1e-9));
+        time_s.extend(rows.time_ns.iter().map(|&ns| ns as f64 / 1e9));
         ordered &= time_s[first.saturating_sub(1)..].is_sorted();
     }
     if !ordered {

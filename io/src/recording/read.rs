@@ -86,7 +86,7 @@ fn time_s(column: &ColumnDescriptor, array: &ArrayRef) -> Option<f64> {
     match column {
         ColumnDescriptor::Time(time) if time.timeline_name().as_str() == TIME && array.is_valid(0) => {
             let times = array.as_any().downcast_ref::<DurationNanosecondArray>()?;
-            Some(times.value(0) as f64 * 1e-9)
+            Some(times.value(0) as f64 / 1e9)
         }
         _ => None,
     }
