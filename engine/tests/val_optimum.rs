@@ -519,3 +519,84 @@ fn no_integrator_has_mt_1() {
         "{refused:?}"
     );
 }
+
+/// With N fixed and Ju limited the far valley, where the derivative is the controller's main part, was never looked at: a
+/// PID was given that is no better than the PI. Gains by an independent brute force.
+#[test]
+fn a_pid_under_a_limit_on_ju_takes_the_far_valley() {
+    for (model, limits, n, jv) in [
+        (rational(&[1.0], &[1.0, 1.0, 0.0], 0.2), (1.6, FREE, 2.0), 10.0, 9.372),
+        (rational(&[1.0], &[0.1, 0.9, -1.0], 0.1), (2.2, FREE, 12.0), 10.0, 0.5818),
+        (rational(&[4.9], &[152.0, 1.0], 2.0), (1.4, 1.2, 8.0), 10.0, 3.8242),
+    ] {
+        let limits = LoopLimits { ms: limits.0, mt: limits.1, ju: limits.2 };
+        let found = solve(&model, Wanted::Pid(DerivativeFilter::Ratio(n)), Objective::Jv, limits);
+        let found = found.expect("an optimum");
+        check_limits(&model, &limits, &found);
+        assert!(found.value < jv * 1.002, "{} {jv}", found.value);
+        let pi = solve(&model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+        assert!(found.value <= pi.value, "{} {}", found.value, pi.value);
+    }
+}
+
+/// The search over Td went to and fro until it gave up: ordinary problems had no answer.
+#[test]
+fn a_pid_search_that_does_not_settle_still_answers() {
+    let lag = rational(&[1.0], &[1.0, 1.0], 10.0);
+    let integrator = rational(&[1.0], &[1.0, 1.0, 0.0], 0.2);
+    for (model, ms, ju, n) in
+        [(&lag, 2.0, 3.3966, 2.0), (&lag, 1.6, 3.0, 10.0), (&integrator, 1.7, 2.714_167_274_040_975_5, 40.0)]
+    {
+        let limits = LoopLimits { ms, mt: FREE, ju };
+        let pi = solve(model, Wanted::Pi, Objective::Jv, limits).expect("an optimum");
+        for filter in [DerivativeFilter::Ratio(n), DerivativeFilter::Free] {
+            let found = solve(model, Wanted::Pid(filter), Objective::Jv, limits).expect("an answer");
+            check_limits(model, &limits, &found);
+            assert!(found.value <= pi.value, "{filter:?} {} {}", found.value, pi.value);
+        }
+    }
+}
+
+/// The free filter ended above N = 1, which it may take.
+#[test]
+fn a_free_filter_is_no_worse_than_its_least_n() {
+    for (model, ms, ju, jv) in [
+        (ProcessModel::Ipdt(Ipdt::new(0.03, 2.0).expect("a model")), 1.4, 8.999_96, 2.526),
+        (rational(&[1.0], &[1.0, 3.0, 3.0, 1.0], 0.5), 1.7, 1.001_72, 3.775),
+    ] {
+        let limits = LoopLimits { ms, mt: FREE, ju };
+        let free =
+            solve(&model, Wanted::Pid(DerivativeFilter::Free), Objective::Jv, limits).expect("an optimum");
+        check_limits(&model, &limits, &free);
+        assert!(free.value < jv * 1.001, "{} {jv}", free.value);
+    }
+}
+
+/// The search by simulation stayed where the least Jv had put it; gains by an independent search.
+#[test]
+fn the_least_iae_of_a_setpoint_is_sought_from_several_places() {
+    for ((k, t, l), ms, iae) in [((2.0, 10.0, 1.0), 1.7, 1.8267), ((1.0, 5.0, 1.0), 1.5, 2.0863)] {
+        let model = ProcessModel::Fopdt(Fopdt::new(k, t, l).expect("a model"));
+        let limits = LoopLimits { ms, mt: FREE, ju: FREE };
+        let found = solve(&model, Wanted::Pid(DerivativeFilter::Ratio(10.0)), Objective::IaeSetpoint, limits)
+            .expect("an optimum");
+        check_limits(&model, &limits, &found);
+        assert!(found.value < iae * 1.005, "{} {iae}", found.value);
+    }
+}
+
+/// What a PI stabilises only with an Ms over 8 was said not to be stabilised by any: e^(−0.9 s)/(s − 1) is by Kc = 1.05,
+/// Ti = 10000 s, with an Ms of 46.8.
+#[test]
+fn a_process_hard_to_stabilise_is_not_called_impossible() {
+    for (l, known) in [(0.7, 8.5), (0.8, 17.0), (0.9, 46.9), (0.95, 180.0)] {
+        let model = rational(&[1.0], &[1.0, -1.0], l);
+        let refused = solve(&model, Wanted::Pi, Objective::Jv, LoopLimits::DEFAULT);
+        let Err(OptimumError::Infeasible { limit: Limit::Ms, floor, .. }) = refused else {
+            panic!("{l}: {refused:?}")
+        };
+        assert!(floor > 8.0 && floor < known, "{l}: {floor}");
+    }
+    let beyond = solve(&rational(&[1.0], &[1.0, -1.0], 1.1), Wanted::Pi, Objective::Jv, LoopLimits::DEFAULT);
+    assert!(matches!(beyond, Err(OptimumError::NotStabilisable { .. })), "{beyond:?}");
+}

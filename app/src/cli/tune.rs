@@ -56,7 +56,8 @@ pub struct Arguments {
     /// Largest Ju = max |C/(1 + L)|, in MV units per PV unit.
     #[arg(long, value_name = "X", requires = "optimal", allow_hyphen_values = true)]
     pub(super) ju: Option<f64>,
-    /// N of the derivative filter Td/N of an optimal PID, or free; free where Ju is limited, else 10.
+    /// N of the derivative filter Td/N of an optimal PID, or free for the best N from 1 to 100; free where Ju is limited,
+    /// else 10.
     #[arg(long, value_name = "N", requires = "optimal")]
     pub(super) filter: Option<String>,
     /// Overshoot of a setpoint step in percent, for which the weight b (and a setpoint filter, if need be) is chosen.

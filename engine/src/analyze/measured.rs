@@ -22,8 +22,21 @@ const FEWEST: usize = 3;
 const BETWEEN: usize = 12;
 /// Decades below the first point that the search looks at; below them the limits rule.
 const DECADES_BELOW: f64 = 3.0;
-/// Slope of ln |G| over ln ω between the first two points under which a process integrates.
-const INTEGRATES: f64 = -0.6;
+/// Slope of ln |G| over ln ω at the lowest frequencies under which a process may integrate, and the least |sin| of the
+/// phase that is left there for ω → 0: within 45° of a quarter of a turn.
+const INTEGRATES: f64 = -0.5;
+const LEAST_SINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Points of the lowest frequencies: so many at least, and all within this part of a decade.
+const LOWEST_POINTS: usize = 8;
+const LOWEST_DECADES: f64 = 1.0 / 3.0;
+/// Fewest points from which a phase can be held against the gain, what it may lead by in radians, in noise besides so many
+/// standard deviations, and what is no lead but a turn lost between two points.
+const FEWEST_OF_BODE: usize = 12;
+const LEAD: f64 = 0.61;
+const LEAD_DEVIATIONS: f64 = 2.5;
+const LOST_TURN: f64 = 4.4;
+/// Share of the largest gain from which on phases are believed.
+const HEARD: f64 = 0.05;
 
 /// Points (ω, G(jω)) of a process in rising frequency, to be read at any frequency up to the last.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +80,18 @@ pub enum FrequencyResponseError {
         /// The last frequency in rad/s.
         omega_rad_s: f64,
     },
+    /// The phase leads the gain by more than a stable process can.
+    #[error(
+        "at {} rad/s the phase of the frequency response is {}° ahead of what its gain allows a stable process: is the process unstable? A measured response must be that of a stable or integrating process; take a model for an unstable one",
+        number(*.omega_rad_s),
+        number(*.lead_deg)
+    )]
+    Unstable {
+        /// Frequency of the largest lead in rad/s.
+        omega_rad_s: f64,
+        /// The lead in degrees, rounded.
+        lead_deg: f64,
+    },
     /// The response ends before half a turn of lag, so that no gain can be told from one too large.
     #[error(
         "the frequency response ends at {} rad/s with a phase of {}°: which gains stabilise cannot be told before −180°; measure to a higher frequency",
@@ -89,6 +114,7 @@ impl FrequencyResponseError {
             Self::TooFew { count: 2 },
             Self::Point { index: 3, omega_rad_s: 0.1 },
             Self::TooShort { gain: 1.2, omega_rad_s: 0.3 },
+            Self::Unstable { omega_rad_s: 0.3, lead_deg: 80.0 },
             Self::BeforeHalfTurn { omega_rad_s: 0.3, phase_deg: -120.0 },
         ]
     }
@@ -100,6 +126,7 @@ impl Explain for FrequencyResponseError {
             Self::TooFew { .. } => "frequency_response.too_few",
             Self::Point { .. } => "frequency_response.point",
             Self::TooShort { .. } => "frequency_response.too_short",
+            Self::Unstable { .. } => "frequency_response.unstable",
             Self::BeforeHalfTurn { .. } => "frequency_response.before_half_turn",
         }
     }
@@ -112,6 +139,9 @@ impl Explain for FrequencyResponseError {
             }
             Self::TooShort { gain, omega_rad_s } => {
                 vec![("gain", number(*gain)), ("omega", number(*omega_rad_s))]
+            }
+            Self::Unstable { omega_rad_s, lead_deg } => {
+                vec![("omega", number(*omega_rad_s)), ("lead", number(*lead_deg))]
             }
             Self::BeforeHalfTurn { omega_rad_s, phase_deg } => {
                 vec![("omega", number(*omega_rad_s)), ("phase", number(*phase_deg))]
@@ -156,8 +186,7 @@ impl FrequencyResponse {
         }
         let log_omega: Vec<f64> = points.iter().map(|p| p.0.ln()).collect();
         let log_gain: Vec<f64> = points.iter().map(|p| p.1.norm().ln()).collect();
-        let slope = (log_gain[1] - log_gain[0]) / (log_omega[1] - log_omega[0]);
-        let power = if slope < INTEGRATES { -1 } else { 0 };
+        let power = if integrates(points, &log_omega, &log_gain) { -1 } else { 0 };
         // The phase at ω → 0 of a positive gain; a negative one is half a turn away from it.
         let upright = f64::from(power) * FRAC_PI_2;
         let first = points[0].1.arg();
@@ -174,7 +203,50 @@ impl FrequencyResponse {
         }
         let gain = (log_gain[0] - f64::from(power) * log_omega[0]).exp();
         let low = Asymptote { coefficient: if negative { -gain } else { gain }, power };
-        Ok(Self { log_omega, log_gain, phase_rad, low })
+        let response = Self { log_omega, log_gain, phase_rad, low };
+        match response.lead() {
+            Some((omega_rad_s, lead)) => {
+                Err(FrequencyResponseError::Unstable { omega_rad_s, lead_deg: lead.to_degrees().round() })
+            }
+            None => Ok(response),
+        }
+    }
+
+    /// Where and how far the phase leads what Bode's relation makes of the gain, if it does by more than noise explains.
+    ///
+    /// A stable process has the phase of its gain, φ(ω) = 1/π ∫ d ln|G|/du ln coth |u/2| du with u = ln(ω′/ω), less what
+    /// dead time and zeros in the right half plane take off with rising ω; a pole there adds up to half a turn. Source:
+    /// Bode, Network Analysis and Feedback Amplifier Design, 1945.
+    fn lead(&self) -> Option<(f64, f64)> {
+        let (x, g) = (&self.log_omega, &self.log_gain);
+        let n = x.len();
+        if n < FEWEST_OF_BODE {
+            return None;
+        }
+        let end = n / 8 + 2;
+        let low = slope_of(&x[..end], &g[..end]);
+        let high = slope_of(&x[n - end..], &g[n - end..]);
+        let whole = PI * PI / 4.0;
+        let of_gain = |at: f64| {
+            let between = (1..n).map(|i| {
+                let slope = (g[i] - g[i - 1]) / (x[i] - x[i - 1]);
+                slope * (log_coth_integral(x[i] - at) - log_coth_integral(x[i - 1] - at))
+            });
+            let below = low * (log_coth_integral(x[0] - at) + whole);
+            let above = high * (whole - log_coth_integral(x[n - 1] - at));
+            (below + between.sum::<f64>() + above) / PI
+        };
+        let leads: Vec<f64> = x.iter().zip(&self.phase_rad).map(|(at, phase)| phase - of_gain(*at)).collect();
+        let bends: f64 = leads.windows(3).map(|l| (l[0] - 2.0 * l[1] + l[2]).powi(2)).sum();
+        let deviation = (bends / (6.0 * (n - 2) as f64)).sqrt();
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+        let start = mean(&leads[..end]);
+        let level = |i: usize| g[i] - f64::from(self.low.power) * x[i];
+        let first = mean(&(0..end).map(level).collect::<Vec<_>>());
+        let smooth = |i: usize| mean(&leads[i - 2..(i + 3).min(n)]) - start;
+        let heard = (end..n).filter(|&i| level(i) > first + HEARD.ln());
+        let (omega, lead) = heard.map(|i| (x[i].exp(), smooth(i))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (lead > LEAD + LEAD_DEVIATIONS * deviation && lead < LOST_TURN).then_some((omega, lead))
     }
 
     /// Number of measured points.
@@ -234,6 +306,50 @@ impl FrequencyResponse {
         found.push(self.last_omega());
         found
     }
+}
+
+/// Whether the lowest frequencies are those of an integrator: a gain that falls, and a quarter of a turn that is left of
+/// the phase when what a dead time or a lag adds in proportion to ω is taken off.
+fn integrates(points: &[(f64, Complex64)], log_omega: &[f64], log_gain: &[f64]) -> bool {
+    let within = log_omega[0] + LOWEST_DECADES * std::f64::consts::LN_10;
+    let count = log_omega.partition_point(|x| *x <= within).max(LOWEST_POINTS.min(points.len()));
+    // Few points may span much of the response: no more than a decade of them, but a line takes two.
+    let decade = log_omega.partition_point(|x| *x <= log_omega[0] + std::f64::consts::LN_10);
+    let count = count.min(decade.max(2));
+    if slope_of(&log_omega[..count], &log_gain[..count]) > INTEGRATES {
+        return false;
+    }
+    let mut phases: Vec<f64> = Vec::with_capacity(count);
+    for (_, g) in &points[..count] {
+        let last = phases.last().copied().unwrap_or_else(|| g.arg());
+        phases.push(g.arg() + 2.0 * PI * ((last - g.arg()) / (2.0 * PI)).round());
+    }
+    let omegas: Vec<f64> = points[..count].iter().map(|p| p.0).collect();
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / count as f64;
+    let left = mean(&phases) - slope_of(&omegas, &phases) * mean(&omegas);
+    left.sin().abs() > LEAST_SINE
+}
+
+/// Slope of the straight line through points, by least squares.
+fn slope_of(x: &[f64], y: &[f64]) -> f64 {
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    let (mx, my) = (mean(x), mean(y));
+    let both: f64 = x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum();
+    both / x.iter().map(|x| (x - mx).powi(2)).sum::<f64>()
+}
+
+/// ∫ ln coth |v/2| dv from 0 to u.
+fn log_coth_integral(u: f64) -> f64 {
+    const TERMS: u32 = 30;
+    let q = (-u.abs()).exp();
+    // The series ends early where u is small, where it is normed to what it comes to at 0.
+    let (mut series, mut at_0, mut power) = (0.0, 0.0, q);
+    for k in (0..TERMS).map(|k| f64::from(2 * k + 1)) {
+        series += power / (k * k);
+        at_0 += 1.0 / (k * k);
+        power *= q * q;
+    }
+    u.signum() * PI * PI / 4.0 * (1.0 - series / at_0)
 }
 
 /// Peaks of the loop of a measured process and a controller over the measured range; `None` for an unstable loop.
@@ -451,6 +567,81 @@ mod tests {
             ] {
                 let (a, b) = (a.expect("a figure"), b.expect("a figure"));
                 assert!((b / a - 1.0).abs() < 4e-3, "{model:?}: {a} {b}");
+            }
+        }
+    }
+
+    /// A measured response with noise: both parts of G times 1 plus so much of a normal deviate.
+    fn noisy(
+        of: impl Fn(f64) -> Complex64,
+        range: (f64, f64),
+        noise: f64,
+        seed: u64,
+    ) -> Vec<(f64, Complex64)> {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        let ratio = (range.1 / range.0).powf(1.0 / 59.0);
+        (0..60)
+            .map(|k| range.0 * ratio.powi(k))
+            .map(|w| (w, of(w) * (1.0 + noise * Complex64::new(draw(), draw()))))
+            .collect()
+    }
+
+    fn lag(gain: f64, t: f64, order: i32, dead_time_s: f64) -> impl Fn(f64) -> Complex64 {
+        move |w| gain * Complex64::from_polar(1.0, -w * dead_time_s) / Complex64::new(1.0, w * t).powi(order)
+    }
+
+    /// The slope of the first two points alone said whether a process integrates: noise on them flipped the sign of the
+    /// controller.
+    #[test]
+    fn noise_on_the_first_points_makes_no_integrator() {
+        for noise in [0.0, 0.03, 0.06, 0.1] {
+            for seed in 0..12 {
+                for (gain, t, order, l, range) in [
+                    (4.9, 152.0, 1, 2.0, (1e-3, 10.0)),
+                    (1.0, 1.0, 3, 1.0, (0.02, 6.0)),
+                    (-1.0, 1.0, 3, 1.0, (0.02, 6.0)),
+                ] {
+                    let points = noisy(lag(gain, t, order, l), range, noise, seed);
+                    let low = FrequencyResponse::new(&points).expect("points").low;
+                    assert_eq!(low.power, 0, "{gain} {t} {noise} {seed}");
+                    assert!(low.coefficient * gain > 0.0, "{gain} {t} {noise} {seed}");
+                }
+                for (gain, l) in [(0.03, 2.0), (-0.03, 2.0)] {
+                    let of = move |w: f64| gain * Complex64::from_polar(1.0, -w * l) / Complex64::new(0.0, w);
+                    let low =
+                        FrequencyResponse::new(&noisy(of, (1e-2, 5.0), noise, seed)).expect("points").low;
+                    assert_eq!(low.power, -1, "{gain} {noise} {seed}");
+                    assert!(low.coefficient * gain > 0.0, "{gain} {noise} {seed}");
+                }
+            }
+        }
+    }
+
+    /// The loop of an unstable process was called stable where it is not: nothing said that the process must be stable.
+    #[test]
+    fn a_response_of_an_unstable_process_is_refused() {
+        let unstable = |l: f64| move |w: f64| Complex64::from_polar(1.0, -w * l) / Complex64::new(-1.0, w);
+        for seed in 0..12 {
+            for (noise, l) in [(0.0, 0.2), (0.0, 0.5), (0.03, 0.2), (0.1, 0.2)] {
+                let refused = FrequencyResponse::new(&noisy(unstable(l), (0.02, 20.0), noise, seed));
+                assert!(
+                    matches!(refused, Err(FrequencyResponseError::Unstable { .. })),
+                    "{noise} {l} {seed}: {refused:?}"
+                );
+            }
+            // What a stable one may do: resonate, answer the wrong way first, lead by a zero.
+            for noise in [0.0, 0.03, 0.1] {
+                let resonant = |w: f64| 1.0 / Complex64::new(1.0 - w * w, 0.04 * w);
+                let inverse = |w: f64| Complex64::new(1.0, -2.0 * w) / Complex64::new(1.0, w).powi(3);
+                let leading = |w: f64| Complex64::new(1.0, 10.0 * w) / Complex64::new(1.0, w).powi(3);
+                let all: [&dyn Fn(f64) -> Complex64; 3] = [&resonant, &inverse, &leading];
+                for (i, of) in all.iter().enumerate() {
+                    let taken = FrequencyResponse::new(&noisy(of, (0.01, 10.0), noise, seed));
+                    assert!(taken.is_ok(), "{i} {noise} {seed}: {taken:?}");
+                }
             }
         }
     }

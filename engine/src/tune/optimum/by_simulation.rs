@@ -16,6 +16,23 @@ use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_re
 const ROUNDS: usize = 20;
 /// Shares of the largest Ki at which searches start.
 const START_SHARES: [f64; 3] = [0.9, 0.5, 0.2];
+/// Grid of the starts away from the least Jv: Td in units of 1/ω, ω where its loop comes nearest to −1, shares of the
+/// largest Kp that meets the limits, Ti in units of its Ti; how many of the best are followed, and N where it is free.
+const START_TDS: [f64; 5] = [0.1, 0.2, 0.35, 0.6, 1.0];
+const START_KPS: [f64; 2] = [0.97, 0.75];
+const START_TIS: [f64; 6] = [0.7, 1.0, 1.5, 2.2, 3.3, 5.0];
+const MOST_SCATTERED: usize = 1;
+const FROM_AFAR: Simplex = Simplex { step: 0.2, last_step: 3e-4, most_evaluations: 100 };
+/// The same from a result that lost more than this by being made exact, how often, and where of the largest Kp it starts.
+const FROM_NEAR: Simplex = Simplex { step: 0.06, last_step: 3e-4, most_evaluations: 60 };
+const LOST: f64 = 1e-3;
+const MOST_CONFIRMED: usize = 3;
+const SHORT_OF_LARGEST: f64 = 0.02;
+const FREE_START_RATIO: f64 = 3.0;
+/// Steps in which that largest Kp is sought on each side of the start's, and halvings after them.
+const KP_STEPS: i32 = 10;
+const KP_STEP: f64 = 1.2;
+const KP_HALVINGS: u32 = 12;
 /// Processes that are taken in one by one before all are simulated, and the relative difference that does not count.
 const MOST_WORST: usize = 6;
 const SAME: f64 = 1e-4;
@@ -80,12 +97,54 @@ fn searched(solver: &mut Solver<'_>, objective: Objective, start: &Optimum) -> O
         let best = searched_among(solver, objective, &at_start, filter, &plants)?;
         let (index, value) = worst(solver, objective, &best, &everything);
         if value <= best.value * (1.0 + SAME) || plants.contains(&index) {
-            return certified(solver, objective, best).ok();
+            return confirmed(solver, objective, filter, best, &plants);
         }
         plants.push(index);
     }
     let best = searched_among(solver, objective, &at_start, filter, &everything)?;
-    certified(solver, objective, best).ok()
+    confirmed(solver, objective, filter, best, &everything)
+}
+
+/// A result made exact; once more from there where that costs it much, because the frequencies that were missing are among
+/// the points only now, or where a simplex ended short of every limit.
+fn confirmed(
+    solver: &mut Solver<'_>,
+    objective: Objective,
+    filter: Option<DerivativeFilter>,
+    seen: Candidate,
+    plants: &[usize],
+) -> Option<Optimum> {
+    let mut best = certified(solver, objective, seen).ok();
+    let mut seen = seen;
+    for _ in 0..MOST_CONFIRMED {
+        let Some(filter) = filter else { break };
+        let done = best.as_ref().is_some_and(|b| {
+            let kept = b.value <= seen.value * (1.0 + LOST);
+            if objective == Objective::IaeSetpoint { kept } else { !b.certificate.active.is_empty() }
+        });
+        if done {
+            break;
+        }
+        let from = place(Some(filter), seen.lead, -SHORT_OF_LARGEST, (seen.ki / seen.kp).ln());
+        let mut again: Option<Candidate> = None;
+        let mut value = |x: &[f64]| {
+            let Some(candidate) = held_at(solver, filter, x, seen.kp) else { return f64::INFINITY };
+            let value = worst(solver, objective, &candidate, plants).1;
+            if value.is_finite() && again.is_none_or(|b| value < b.value) {
+                again = Some(Candidate { value, ..candidate });
+            }
+            value
+        };
+        minimise(&FROM_NEAR, &from, &mut value);
+        let Some(found) = again else { break };
+        seen = found;
+        let sure = certified(solver, objective, found).ok();
+        best = match (best, sure) {
+            (Some(old), Some(new)) if new.value >= old.value => Some(old),
+            (old, new) => new.or(old),
+        };
+    }
+    best
 }
 
 /// The best that simplexes come to where only some processes are simulated.
@@ -99,13 +158,7 @@ fn searched_among(
     let Candidate { lead, kp, .. } = *start;
     let mut best: Option<Candidate> = None;
     for share in START_SHARES {
-        let mut from = vec![kp.ln(), f64::ln(share)];
-        if filter.is_some() {
-            from.push(lead.td_s.ln());
-        }
-        if filter == Some(DerivativeFilter::Free) {
-            from.push((lead.td_s / lead.tf_s).ln());
-        }
+        let from = place(filter, lead, kp.ln(), share.ln());
         let mut value = |x: &[f64]| {
             let Some(candidate) = candidate_at(solver, filter, x) else { return f64::INFINITY };
             let value = worst(solver, objective, &candidate, plants).1;
@@ -116,7 +169,94 @@ fn searched_among(
         };
         minimise(&SIMPLEX, &from, &mut value);
     }
+    if let Some(filter) = filter
+        && objective == Objective::IaeSetpoint
+    {
+        for from in scattered(solver, objective, filter, start, plants) {
+            let mut value = |x: &[f64]| {
+                let Some(candidate) = held_at(solver, filter, x, kp) else { return f64::INFINITY };
+                let value = worst(solver, objective, &candidate, plants).1;
+                if value.is_finite() && best.is_none_or(|b| value < b.value) {
+                    best = Some(Candidate { value, ..candidate });
+                }
+                value
+            };
+            minimise(&FROM_AFAR, &from, &mut value);
+        }
+    }
     best
+}
+
+/// Coordinates of a place, the last two as far as they are free.
+fn place(filter: Option<DerivativeFilter>, lead: Lead, first: f64, second: f64) -> Vec<f64> {
+    let mut x = vec![first, second];
+    if filter.is_some() {
+        x.push(lead.td_s.ln());
+    }
+    if filter == Some(DerivativeFilter::Free) {
+        x.push((lead.td_s / lead.tf_s).ln());
+    }
+    x
+}
+
+/// Starts far from the least Jv: what is best for a setpoint wants more Kp, a Ti near the process's own time and a small
+/// Td, so a coarse grid is simulated and the best of some Td are taken. Coordinates as [`held_at`] reads them.
+fn scattered(
+    solver: &mut Solver<'_>,
+    objective: Objective,
+    filter: DerivativeFilter,
+    start: &Candidate,
+    plants: &[usize],
+) -> Vec<Vec<f64>> {
+    let omega = solver.nearest_omega(start);
+    let n = match filter {
+        DerivativeFilter::Ratio(n) => n,
+        DerivativeFilter::Free => FREE_START_RATIO,
+    };
+    let mut best: Vec<(f64, Vec<f64>)> = Vec::new();
+    for td in START_TDS {
+        let td_s = td / omega;
+        let lead = Lead { td_s, tf_s: td_s / n };
+        let mut of_td: Option<(f64, Vec<f64>)> = None;
+        for share in START_KPS {
+            for times in START_TIS {
+                let x = place(Some(filter), lead, f64::ln(share), (start.ki / (start.kp * times)).ln());
+                let Some(candidate) = held_at(solver, filter, &x, start.kp) else { continue };
+                let value = worst(solver, objective, &candidate, plants).1;
+                if value.is_finite() && of_td.as_ref().is_none_or(|b| value < b.0) {
+                    of_td = Some((value, x));
+                }
+            }
+        }
+        best.extend(of_td);
+    }
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    best.into_iter().take(MOST_SCATTERED).map(|b| b.1).collect()
+}
+
+/// ln of the share of the largest Kp, −ln Ti, ln Td, ln N: without walls, for what a limit holds stays at the limit.
+fn held_at(solver: &mut Solver<'_>, filter: DerivativeFilter, x: &[f64], about: f64) -> Option<Candidate> {
+    let td_s = x[2].exp();
+    let n = match filter {
+        DerivativeFilter::Ratio(n) => n,
+        DerivativeFilter::Free => x[3].exp().clamp(RATIO_RANGE.0, RATIO_RANGE.1),
+    };
+    let lead = Lead { td_s, tf_s: td_s / n };
+    let limits = solver.limits;
+    let mut meets = |kp: f64| solver.at_gain(Objective::MaxKi, &limits, lead, kp).is_some();
+    // From below: past the gains that stabilise a loop may keep its distance from −1 as well.
+    let mut low = (0..KP_STEPS).map(|k| about / KP_STEP.powi(k)).find(|kp| meets(*kp))?;
+    while low < about * KP_STEP.powi(KP_STEPS) && meets(low * KP_STEP) {
+        low *= KP_STEP;
+    }
+    let mut high = low * KP_STEP;
+    for _ in 0..KP_HALVINGS {
+        let middle = 0.5 * (low + high);
+        if meets(middle) { low = middle } else { high = middle }
+    }
+    let kp = low * x[0].exp().min(1.0);
+    let largest = solver.at_gain(Objective::MaxKi, &limits, lead, kp)?;
+    Some(Candidate { ki: largest.ki.min(kp * x[1].exp()), ..largest })
 }
 
 /// ln Kp, ln of the share of the largest Ki, ln Td, ln N.

@@ -58,6 +58,12 @@ impl<'a> Family<'a> {
         self.halvings.iter().any(|times| *times > 0)
     }
 
+    /// Whether the static gain of a process has the other sign than the controller, as an odd number of unstable poles
+    /// wants it.
+    pub fn is_reversed(&self) -> bool {
+        self.plants.iter().any(|p| p.low.power == 0 && self.sign * p.low.coefficient < 0.0)
+    }
+
     /// Gains with their sign, as a controller of the parallel form.
     pub fn gains(&self, lead: Lead, kp: f64, ki: f64) -> ParallelGains {
         ParallelGains {

@@ -46,6 +46,18 @@ pub(super) fn explain(solver: &mut Solver<'_>) -> OptimumError {
     match least(solver, limit, &own) {
         Some(floor) if own == asked => OptimumError::Infeasible { controller, limit, asked: asked.ms, floor },
         Some(floor) => OptimumError::InfeasibleTogether { controller, limit, floor },
+        None => beyond(solver, &asked),
+    }
+}
+
+/// The answer where even the largest Ms that is ever allowed is too strict: a loop that is all but unstable, or none.
+fn beyond(solver: &mut Solver<'_>, asked: &LoopLimits) -> OptimumError {
+    let controller = solver.controller();
+    match solver.least(Relax::beyond()).map(|(floor, _)| floor) {
+        Some(floor) if asked.mt.is_infinite() && asked.ju.is_infinite() => {
+            OptimumError::Infeasible { controller, limit: Limit::Ms, asked: asked.ms, floor }
+        }
+        Some(floor) => OptimumError::InfeasibleTogether { controller, limit: Limit::Ms, floor },
         None => OptimumError::NotStabilisable { controller },
     }
 }

@@ -97,6 +97,8 @@ struct Task<'a, 'b> {
     integral_alone: bool,
     /// Any Ki does, however large.
     any_ki: bool,
+    /// Only a Ki well above 0 may stabilise: every interval of Ki is tested.
+    needs_ki: bool,
 }
 
 impl Spot for AtGain {
@@ -127,6 +129,9 @@ impl<'a, 'b> Task<'a, 'b> {
             stabilising: Vec::new(),
             integral_alone: family.plants.iter().all(|p| p.low.power == 0),
             any_ki: family.plants.iter().all(plain),
+            // Of a derivative with a slow filter Kp is the least part: an unstable process may take one that is too small
+            // on its own.
+            needs_ki: lead.td_s > 0.0 && on.limits.ju.is_finite() && family.is_reversed(),
         }
     }
 }
@@ -147,6 +152,10 @@ impl GainSearch {
             let family = on.family;
             task.stabilising = family.stabilising(&task.shaped);
             task.integral_alone &= task.stabilising.first().is_some_and(|i| i.0 == 0.0);
+            if task.needs_ki {
+                let last = task.stabilising.last().map_or(f64::INFINITY, |i| i.1);
+                task.stabilising = vec![(0.0, last)];
+            }
             if task.stabilising.is_empty() {
                 return Found::NotStabilising;
             }
@@ -304,7 +313,11 @@ impl GainSearch {
                 continue;
             }
             // From Ki = 0⁺ on nothing crosses −1; further intervals have to show that they are stable.
-            if low > 0.0 {
+            if task.needs_ki {
+                if !task.family.is_stable(task.shaped.lead, kp, 0.5 * (low + high)) {
+                    continue;
+                }
+            } else if low > 0.0 {
                 if !counted {
                     self.over_ki.at(task.family, task.shaped.lead, kp);
                     counted = true;

@@ -10,8 +10,14 @@ use super::valley::{Spot, valley};
 /// comes nearest to −1.
 /// Long dead times have a second valley far out, where the derivative is the controller's main part.
 const TDS: [f64; 13] = [0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5, 9.0, 15.0, 25.0, 40.0];
+/// Tf at which it looks as well where Ju is limited, in the same units: there the controller is one of proportional action
+/// N + 1 times Kp over most frequencies and of less below, which a limit on C S leaves room for. For Tf → ∞ it is the PI.
+const FAR_TFS: [f64; 7] = [2.0, 4.5, 10.0, 22.0, 50.0, 110.0, 250.0];
+/// Valleys of Td that are followed to their bottom where Ju is limited.
+const MOST_VALLEYS: usize = 4;
 /// N at which it looks first where the filter is free, and its range.
 const RATIOS: [f64; 3] = [1.5, 6.0, 25.0];
+const RATIOS_HELD: [f64; 4] = [1.0, 1.5, 6.0, 25.0];
 pub(super) const RATIO_RANGE: (f64, f64) = (1.0, 100.0);
 /// How far a refinement may go from where it starts, as a logarithm of Td.
 const FARTHEST: f64 = 1.5;
@@ -25,30 +31,50 @@ const LAST_NEARBY: f64 = 3e-6;
 const LAST_OF_TWO: f64 = 1e-4;
 const MOST_OF_TWO: usize = 60;
 
-/// The best of a grid of Td, and of N where it is free.
+/// The best of a grid of Td, and of N where it is free; where Ju is limited the best of each valley, the lowest first.
+///
+/// # Errors
+/// What it is instead where there is none.
 pub(super) fn look(
     search: &mut GainSearch,
     on: &Ground<'_, '_>,
     filter: DerivativeFilter,
     omega: f64,
-) -> Found {
+) -> Result<Vec<Candidate>, Found> {
+    let held = on.limits.ju.is_finite() && on.relax.is_none();
     let ratios: &[f64] = match &filter {
         DerivativeFilter::Ratio(n) => std::slice::from_ref(n),
+        DerivativeFilter::Free if held => &RATIOS_HELD,
         DerivativeFilter::Free => &RATIOS,
     };
-    let mut best = Found::Nothing;
+    // Far out few gains meet the limits.
+    let care = if held { Care::Full } else { Care::Coarse };
+    let mut valleys: Vec<Candidate> = Vec::new();
     for &n in ratios {
-        for td in TDS {
+        let mut tds: Vec<f64> = TDS.to_vec();
+        if held {
+            tds.extend(FAR_TFS.iter().map(|tf| n * tf));
+            tds.sort_unstable_by(f64::total_cmp);
+        }
+        let mut seen: Vec<Option<Candidate>> = Vec::with_capacity(tds.len());
+        for td in tds {
             let td_s = td / omega;
-            match (search.run(on, Lead { td_s, tf_s: td_s / n }, Care::Coarse), best) {
-                (Found::Best(new), Found::Best(old)) if new.value >= old.value => {}
-                (found @ Found::Best(_), _) => best = found,
-                (Found::Unbounded, _) => return Found::Unbounded,
-                _ => {}
+            match search.run(on, Lead { td_s, tf_s: td_s / n }, care) {
+                Found::Best(found) => seen.push(Some(found)),
+                Found::Unbounded => return Err(Found::Unbounded),
+                Found::Nothing | Found::NotStabilising => seen.push(None),
             }
         }
+        let value = |k: Option<usize>| k.and_then(|k| *seen.get(k)?).map_or(f64::INFINITY, |c| c.value);
+        let bottom = |i: &usize| {
+            let own = value(Some(*i));
+            own.is_finite() && own < value(i.checked_sub(1)) && own <= value(Some(i + 1))
+        };
+        valleys.extend((0..seen.len()).filter(bottom).filter_map(|i| seen[i]));
     }
-    best
+    valleys.sort_by(|a, b| a.value.total_cmp(&b.value));
+    valleys.truncate(if held { MOST_VALLEYS } else { 1 });
+    if valleys.is_empty() { Err(Found::Nothing) } else { Ok(valleys) }
 }
 
 /// The best about known gains.
@@ -59,7 +85,7 @@ pub(super) fn refine(
     known: Candidate,
     step: f64,
 ) -> Found {
-    let mut kp = known.kp;
+    let (mut kp, mut td_before) = (known.kp, known.lead.td_s);
     let start = known.lead.td_s.ln();
     let mut at = |x: f64, n: f64| -> AtLead {
         if (x - start).abs() > FARTHEST {
@@ -67,8 +93,14 @@ pub(super) fn refine(
         }
         let td_s = x.exp();
         let lead = Lead { td_s, tf_s: td_s / n };
-        match search.run(on, lead, Care::CoarseNear(kp)) {
+        let mut found = search.run(on, lead, Care::CoarseNear(kp));
+        if found == Found::Nothing {
+            // Where the derivative is the controller's main part it is Kp Td that stays.
+            found = search.run(on, lead, Care::CoarseNear(kp * td_before / td_s));
+        }
+        match found {
             Found::Best(found) => {
+                td_before = td_s;
                 kp = found.kp;
                 AtLead { x, found: Some(found) }
             }

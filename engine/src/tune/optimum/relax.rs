@@ -7,6 +7,7 @@ use super::solve::{LARGEST_MS, Quest, Solver};
 
 /// Largest values that are tried: of a limit on Ju and of the stretch, in units of what is given.
 const MOST_JU: f64 = 1e6;
+const MOST_MS: f64 = 1e3;
 const MOST_STRETCH: f64 = 30.0;
 /// Rounds of search and exact check, and the relative excess at which they end.
 const ROUNDS: usize = 8;
@@ -40,6 +41,12 @@ impl Relax {
             Limit::Ju => (given.ju, MOST_JU * given.ju),
         };
         (range.0 < range.1).then_some(Self { giving: Giving::One(limit), given, range })
+    }
+
+    /// Ms alone, from the largest that an optimum ever passes upwards.
+    pub fn beyond() -> Self {
+        let given = LoopLimits { ms: LARGEST_MS, mt: f64::INFINITY, ju: f64::INFINITY };
+        Self { giving: Giving::One(Limit::Ms), given, range: (LARGEST_MS - 1.0, MOST_MS - 1.0) }
     }
 
     /// All limits by a factor, 1 as given.

@@ -6,7 +6,7 @@ use super::error::OptimumError;
 use super::family::Family;
 use super::floor;
 use super::gain_search::{Candidate, Care, Found, GainSearch, Ground};
-use super::lead_search;
+use super::lead_search::{self, RATIO_RANGE};
 use super::points::{Plant, Points};
 use super::problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
 use super::relax::Relax;
@@ -15,6 +15,17 @@ use super::slice::Lead;
 /// Rounds of search and check, and of the last steps at fixed Kp, at most.
 const ROUNDS: usize = 14;
 const LAST_STEPS: usize = 14;
+/// Relative excess up to which gains all but meet the limits, and how much better they must be to be gone back to.
+const ALL_BUT: f64 = 0.02;
+const DEEPER: f64 = 0.01;
+/// Relative loss from one round to the next after which gains are sought afresh.
+const LOST: f64 = 0.02;
+/// First and last step, as a logarithm, of the walk over Td and N with the search at rest at each.
+const WALK: (f64, f64) = (0.16, 0.009);
+/// Rounds at fixed Td and Tf; how much stricter the limits get there, and by which factor from round to round.
+const ROUNDS_AT_REST: usize = ROUNDS + 22;
+const SHORT: f64 = 1e-7;
+const SHORTER: f64 = 2.0;
 /// Relative excess over a limit from which on Kp, Td and Tf stay as they are.
 const CLOSE: f64 = 2e-6;
 /// Ms that no optimum passes, whatever the limit: beyond it a loop is all but unstable.
@@ -112,6 +123,31 @@ impl Quest {
     }
 }
 
+/// The better of two results.
+fn better(a: Found, b: Found) -> Found {
+    match (a, b) {
+        (Found::Best(first), Found::Best(second)) if second.value < first.value => b,
+        (Found::Best(_), _) => a,
+        _ => b,
+    }
+}
+
+/// Known gains sought afresh at their Td and some about it: far out in Td the gains that meet the limits are so few that
+/// points added meanwhile may have put them elsewhere.
+fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Candidate {
+    let mut best: Option<Candidate> = None;
+    for times in [1.0, 0.96, 1.04] {
+        let Lead { td_s, tf_s } = known.lead;
+        let lead = Lead { td_s: times * td_s, tf_s: times * tf_s };
+        if let Found::Best(found) = search.run(on, lead, Care::Full)
+            && best.is_none_or(|b| found.value < b.value)
+        {
+            best = Some(found);
+        }
+    }
+    best.unwrap_or(known)
+}
+
 /// A problem with its points and workspace.
 pub(super) struct Solver<'a> {
     pub family: Family<'a>,
@@ -155,14 +191,18 @@ impl<'a> Solver<'a> {
             Found::Unbounded => return Found::Unbounded,
             Found::Nothing | Found::NotStabilising => self.family.plants[0].typical_omega(),
         };
-        let mut pid = lead_search::look(&mut self.search, &on, filter, omega);
-        if pid == Found::Nothing {
+        let mut looked = lead_search::look(&mut self.search, &on, filter, omega);
+        if looked == Err(Found::Nothing) {
             // What needs derivative action to be stable at all may be far slower than its own frequencies say.
-            pid = lead_search::look(&mut self.search, &on, filter, 0.1 * omega);
+            looked = lead_search::look(&mut self.search, &on, filter, 0.1 * omega);
         }
-        let pid = match pid {
-            Found::Best(known) => self.refined(quest, filter, known, lead_search::STEP),
-            other => other,
+        let pid = match looked {
+            Ok(valleys) => {
+                let mut refine = |known| self.refined(quest, filter, known, lead_search::STEP);
+                let bottoms: Vec<Found> = valleys.into_iter().map(&mut refine).collect();
+                bottoms.into_iter().reduce(better).unwrap_or(Found::Nothing)
+            }
+            Err(other) => other,
         };
         match (pid, pi) {
             (Found::Best(with), Found::Best(without)) if without.value < with.value => pi,
@@ -174,8 +214,12 @@ impl<'a> Solver<'a> {
     /// About known gains, on the points that bear on them and on those that turn out to.
     fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, step: f64) -> Found {
         let all = &self.family.points;
+        let held = quest.limits.ju.is_finite() && quest.relax.is_none();
         let mut points = all.near(&quest.limits_at(&known), known.lead, known.kp, known.ki);
         let whole = quest.on(&self.family, all);
+        let stays = |c: Candidate| c.value <= known.value + LOST * known.value.abs();
+        let kept = !held || self.search.at_gain(&whole, known.lead, known.kp).is_some_and(stays);
+        let known = if kept { known } else { afresh(&mut self.search, &whole, known) };
         let mut best: Option<Candidate> = None;
         for trial in 0..TRIALS {
             let on = Ground { points: &points, ..whole };
@@ -201,7 +245,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Where the loop of a candidate comes nearest to −1, in rad/s.
-    fn nearest_omega(&self, candidate: &Candidate) -> f64 {
+    pub fn nearest_omega(&self, candidate: &Candidate) -> f64 {
         let gains = self.family.gains(candidate.lead, candidate.kp, candidate.ki);
         let typical = self.family.plants[0].typical_omega();
         let peak = self.family.peaks(0, &gains).ok().flatten().map(|p| p.s.omega_rad_s);
@@ -243,8 +287,31 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Least Jv or largest Ki; `None` where no gains meet the limits.
+    /// Least Jv or largest Ki; `None` where no gains meet the limits. A PID is never worse than the PI.
     pub fn within_limits(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
+        let found = self.sought(objective);
+        let open = match &found {
+            Ok(_) => true,
+            Err(OptimumError::NotCertified { .. }) => !self.takes_any_gain(),
+            Err(_) => false,
+        };
+        if self.wanted == Wanted::Pi || !open {
+            return found;
+        }
+        let wanted = std::mem::replace(&mut self.wanted, Wanted::Pi);
+        let simple = self.sought(objective);
+        self.wanted = wanted;
+        let cost = |o: &Optimum| if objective == Objective::Jv { o.value } else { -o.value };
+        match (found, simple) {
+            (Ok(Some(with)), Ok(Some(without))) if cost(&without) < cost(&with) => Ok(Some(without)),
+            (Ok(Some(with)), _) => Ok(Some(with)),
+            (_, Ok(Some(without))) => Ok(Some(without)),
+            (found, _) => found,
+        }
+    }
+
+    /// The same by one search, which may end in a valley that is not the deepest.
+    fn sought(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
         // Two integrators in the loop: ∫ ln|T|/ω² dω ≥ 0, so |T| passes 1 somewhere.
         let integrates = self.family.plants.iter().any(|p| p.low.power < 0);
         if integrates && self.limits.mt <= 1.0 + LEAST_MT {
@@ -253,6 +320,9 @@ impl<'a> Solver<'a> {
         let mut known: Option<Candidate> = None;
         let mut excess = f64::INFINITY;
         let quest = Quest { objective, limits: self.limits, relax: None };
+        // The best that all but met the limits: a deep valley may be too narrow to follow from round to round.
+        let mut last: Option<Candidate> = None;
+        let mut promising: Option<Candidate> = None;
         let mut sought_least = false;
         for round in 1..=ROUNDS {
             let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(&quest, k));
@@ -280,6 +350,12 @@ impl<'a> Solver<'a> {
                 known = None;
                 continue;
             }
+            last = Some(candidate);
+            let held = Candidate { value: check.peaks.v.value, ..candidate };
+            let all_but = check.excess < ALL_BUT && objective == Objective::Jv;
+            if all_but && promising.is_none_or(|p| held.value < p.value) {
+                promising = Some(held);
+            }
             // The first look is a coarse one.
             if known.is_none() {
                 self.add(&check);
@@ -288,11 +364,95 @@ impl<'a> Solver<'a> {
             }
             excess = check.excess;
             if let Some(found) = self.accepted(objective, candidate, check, round)? {
+                let deeper =
+                    promising.filter(|p| p.lead.td_s > 0.0 && p.value < found.value * (1.0 - DEEPER));
+                let rest = match deeper {
+                    Some(known) => self.walked(&quest, known.lead)?,
+                    None => None,
+                };
+                let best = rest.filter(|rest| rest.value < found.value);
+                return Ok(Some(best.unwrap_or(found)));
+            }
+            known = Some(candidate);
+        }
+        let rest = match last {
+            Some(known) if !self.takes_any_gain() => self.walked(&quest, promising.unwrap_or(known).lead)?,
+            _ => None,
+        };
+        rest.map_or(Err(OptimumError::NotCertified { excess_percent: 100.0 * excess }), |found| {
+            Ok(Some(found))
+        })
+    }
+
+    /// Where every round of the search goes elsewhere: downhill over Td and N from one to the next that [`Self::at_rest`]
+    /// answers.
+    fn walked(&mut self, quest: &Quest, from: Lead) -> Result<Option<Optimum>, OptimumError> {
+        let Some(mut best) = self.at_rest(quest, from)? else { return Ok(None) };
+        let Wanted::Pid(filter) = self.wanted else { return Ok(Some(best)) };
+        if from.td_s == 0.0 {
+            return Ok(Some(best));
+        }
+        let cost = |o: &Optimum| if quest.objective == Objective::Jv { o.value } else { -o.value };
+        let free = filter == DerivativeFilter::Free;
+        let directions: &[(f64, f64)] = if free {
+            &[(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+        } else {
+            &[(1.0, 0.0), (-1.0, 0.0)]
+        };
+        let (mut td_s, mut n) = (from.td_s, from.td_s / from.tf_s);
+        let mut step = WALK.0;
+        while step > WALK.1 {
+            let mut better = false;
+            for (of_td, of_n) in directions {
+                let next_td = td_s * (step * of_td).exp();
+                let next_n =
+                    if free { (n * (step * of_n).exp()).clamp(RATIO_RANGE.0, RATIO_RANGE.1) } else { n };
+                let lead = Lead { td_s: next_td, tf_s: next_td / next_n };
+                if let Some(found) = self.at_rest(quest, lead)?.filter(|found| cost(found) < cost(&best)) {
+                    (best, td_s, n, better) = (found, next_td, next_n, true);
+                    break;
+                }
+            }
+            if !better {
+                step *= 0.4;
+            }
+        }
+        Ok(Some(best))
+    }
+
+    /// The best of one Td and Tf, under limits a little stricter than those
+    /// that are to be met, and ever more so.
+    fn at_rest(&mut self, quest: &Quest, lead: Lead) -> Result<Option<Optimum>, OptimumError> {
+        let LoopLimits { ms, mt, ju } = self.limits;
+        let mut known: Option<Candidate> = None;
+        for round in 0..ROUNDS_AT_REST {
+            // The first rounds put the points where they are missing.
+            let short =
+                if round < ROUNDS { 0.0 } else { (SHORT * SHORTER.powi((round - ROUNDS) as i32)).min(0.5) };
+            let within = |limit: f64| 1.0 + (limit - 1.0) * (1.0 - short);
+            let floor = self.family.least_ju();
+            let strict =
+                LoopLimits { ms: within(ms), mt: within(mt), ju: (ju * (1.0 - short)).max(floor.min(ju)) };
+            let stricter = Quest { limits: strict, ..*quest };
+            let on = stricter.on(&self.family, &self.family.points);
+            let near = known.map_or(Found::Nothing, |k| self.search.run(&on, lead, Care::Near(k.kp)));
+            let found = if near == Found::Nothing { self.search.run(&on, lead, Care::Full) } else { near };
+            let Found::Best(candidate) = found else { return Ok(None) };
+            let check = self.check(quest.objective, &candidate)?;
+            if !check.unstable.is_empty() {
+                check.unstable.iter().for_each(|plant| self.family.refine(*plant));
+                known = None;
+                continue;
+            }
+            if check.excess <= MET {
+                return Ok(Some(self.certified(quest.objective, &candidate, candidate.value, check, round)));
+            }
+            if let Some(found) = self.accepted(quest.objective, candidate, check, round)? {
                 return Ok(Some(found));
             }
             known = Some(candidate);
         }
-        Err(OptimumError::NotCertified { excess_percent: 100.0 * excess })
+        Ok(None)
     }
 
     pub fn check(&self, objective: Objective, candidate: &Candidate) -> Result<Check, OptimumError> {
@@ -328,8 +488,20 @@ impl<'a> Solver<'a> {
             return Ok(None);
         }
         let Some((last, check)) = self.last_steps(objective, candidate, check)? else { return Ok(None) };
+        Ok(Some(self.certified(objective, &last, seen, check, round)))
+    }
+
+    /// A candidate that the exact analysis confirms; `seen` is what the points alone make of the problem.
+    fn certified(
+        &self,
+        objective: Objective,
+        last: &Candidate,
+        seen: f64,
+        check: Check,
+        rounds: usize,
+    ) -> Optimum {
         let value = if objective == Objective::Jv { check.peaks.v.value } else { last.ki };
-        Ok(Some(Optimum {
+        Optimum {
             gains: self.family.gains(last.lead, last.kp, last.ki),
             value,
             certificate: Certificate {
@@ -337,9 +509,9 @@ impl<'a> Solver<'a> {
                 peaks: check.peaks,
                 gap: Some((1.0 - seen / if objective == Objective::Jv { value } else { -value }).abs()),
                 excess: check.excess.max(0.0),
-                rounds: round,
+                rounds,
             },
-        }))
+        }
     }
 
     /// Ki alone follows the limits down to rounding: at fixed Kp, Td and Tf the points converge quadratically.
