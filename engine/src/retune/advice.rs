@@ -105,6 +105,7 @@ pub enum Advice {
 }
 
 impl std::fmt::Display for Advice {
+    #[allow(clippy::too_many_lines, reason = "one sentence a kind")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let n = |v: &f64| number(*v);
         let whole = |v: &f64| number(v.round());

@@ -124,7 +124,7 @@ fn decide(
     let (first, recommended) = match (present, gain) {
         (None, _) => (Advice::Best { controller: new.controller }, best),
         (Some(p), _) if !p.analysis.stable => (Advice::PresentUnstable, best),
-        (Some(p), None) if !p.gains.ti_s.is_finite() => (Advice::NoIntegral, best),
+        (Some(p), None) if p.gains.ki == 0.0 => (Advice::NoIntegral, best),
         (Some(p), gain) => {
             let within = keeps(p, options) && is_robust(p, options.limits.ms);
             match gain {
