@@ -9,6 +9,7 @@ mod closed_loop;
 mod frequency;
 mod grid;
 mod measured;
+mod measured_error;
 mod metrics;
 mod open_loop;
 mod response;
@@ -22,7 +23,8 @@ pub use analysis::{
 };
 pub use frequency::{CurveOptions, LoopFunction, frequency_curve, frequency_range};
 pub(crate) use grid::{natural_frequencies, resonances};
-pub use measured::{FrequencyResponse, FrequencyResponseError, analyze_measured, measured_peaks};
+pub use measured::{FrequencyResponse, analyze_measured, measured_peaks};
+pub use measured_error::FrequencyResponseError;
 pub use metrics::{Excitation, Metrics, MetricsError, metrics, metrics_at_rest};
 pub(crate) use open_loop::Asymptote;
 pub use open_loop::OpenLoop;
