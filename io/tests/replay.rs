@@ -467,7 +467,7 @@ fn a_file_that_is_taken_away_is_begun_anew() {
     std::thread::sleep(Duration::from_millis(2500));
     let told = recording.troubles();
     assert!(told.iter().any(|t| matches!(t, RecordingTrouble::Removed { .. })), "{told:?}");
-    assert!(recording.unwritten() > 0);
+    assert!(recording.tally().unwritten() > 0);
     close(&session, recording);
     assert!(only_run(&path).len() > 50);
 }

@@ -222,14 +222,7 @@ impl ControlLoop {
     /// The limit at which the output stands.
     #[must_use]
     pub fn at_limit(&self) -> Option<Bound> {
-        let mv = self.mv();
-        if mv >= self.limits.high {
-            Some(Bound::High)
-        } else if mv <= self.limits.low {
-            Some(Bound::Low)
-        } else {
-            None
-        }
+        self.limits.reached(self.mv())
     }
 
     /// The side to which an outer loop must not move this loop's setpoint further: that way the output cannot go.

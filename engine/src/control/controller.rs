@@ -44,6 +44,18 @@ pub struct Limits {
 }
 
 impl Limits {
+    /// The limit at which a value stands, or past which it is.
+    #[must_use]
+    pub fn reached(self, value: f64) -> Option<Bound> {
+        if value >= self.high {
+            Some(Bound::High)
+        } else if value <= self.low {
+            Some(Bound::Low)
+        } else {
+            None
+        }
+    }
+
     /// The nearest value within.
     #[must_use]
     pub fn clamp(self, value: f64) -> f64 {

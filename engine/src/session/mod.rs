@@ -30,7 +30,7 @@ use crate::plant::{Measurement, Network};
 use crate::signal::SampleBlock;
 use crate::sim::{ClosedLoop, ScenarioEvent};
 use replay::Player;
-use worker::{Ports, Worker};
+use worker::Worker;
 
 /// Longest wait for the worker to end, when its session is dropped.
 const LONGEST_FAREWELL: Duration = Duration::from_secs(2);
@@ -91,6 +91,15 @@ pub enum SessionCommand {
     Shutdown,
 }
 
+/// What a worker shares with its handle.
+struct Ports {
+    commands: Receiver<SessionCommand>,
+    blocks: Sender<SampleBlock>,
+    events: Sender<Event>,
+    latest: Arc<Mutex<Arc<Snapshot>>>,
+    notify: Notify,
+}
+
 /// A running session; dropping it ends the worker.
 pub struct Session {
     commands: Sender<SessionCommand>,
@@ -119,27 +128,10 @@ impl Session {
     /// When the system cannot start a thread.
     #[must_use]
     pub fn of(closed: ClosedLoop, notify: Notify) -> Self {
-        let network = closed.network().clone();
-        let (commands, command_queue) = bounded(4096);
-        let (block_queue, blocks) = bounded(256);
-        let (event_queue, events) = bounded(4096);
-        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(network))));
-        let ports = Ports {
-            commands: command_queue,
-            blocks: block_queue,
-            events: event_queue,
-            latest: latest.clone(),
-            notify,
-        };
+        let (handle, ports) = Self::without_worker(closed.network().clone(), 256, 4096, notify);
         let worker = Worker::new(closed, ports);
-        if let Ok(mut first) = latest.lock() {
-            *first = Arc::new(worker.snapshot());
-        }
-        let worker = std::thread::Builder::new()
-            .name("vasos-session".to_owned())
-            .spawn(move || worker.run())
-            .expect("the system can start a thread");
-        Self { commands, blocks, events, latest, worker: Some(worker) }
+        let first = worker.snapshot();
+        handle.working("vasos-session", first, move || worker.run())
     }
 
     /// Plays a recording, paused at its beginning. All its rows and events are delivered at once; snapshots show the
@@ -149,26 +141,42 @@ impl Session {
     /// When the system cannot start a thread.
     #[must_use]
     pub fn replay(recorded: Arc<RecordedRun>, notify: Notify) -> Self {
+        let (network, most_events) = (recorded.network.clone(), recorded.events.len() + 64);
+        let (handle, ports) = Self::without_worker(network, 2, most_events, notify);
+        let player = Player::new(recorded, ports);
+        let first = player.snapshot();
+        handle.working("vasos-replay", first, move || player.run())
+    }
+
+    /// A handle, and what its worker is to share with it.
+    fn without_worker(
+        network: Arc<Network>,
+        most_blocks: usize,
+        most_events: usize,
+        notify: Notify,
+    ) -> (Self, Ports) {
         let (commands, command_queue) = bounded(4096);
-        let (block_queue, blocks) = bounded(2);
-        let (event_queue, events) = bounded(recorded.events.len() + 64);
-        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(recorded.network.clone()))));
-        let ports = replay::Ports {
+        let (block_queue, blocks) = bounded(most_blocks);
+        let (event_queue, events) = bounded(most_events);
+        let latest = Arc::new(Mutex::new(Arc::new(Snapshot::empty(network))));
+        let ports = Ports {
             commands: command_queue,
             blocks: block_queue,
             events: event_queue,
             latest: latest.clone(),
             notify,
         };
-        let player = Player::new(recorded, ports);
-        if let Ok(mut first) = latest.lock() {
-            *first = Arc::new(player.snapshot());
+        (Self { commands, blocks, events, latest, worker: None }, ports)
+    }
+
+    /// The handle with its worker begun, on a first snapshot.
+    fn working(mut self, name: &str, first: Snapshot, work: impl FnOnce() + Send + 'static) -> Self {
+        if let Ok(mut latest) = self.latest.lock() {
+            *latest = Arc::new(first);
         }
-        let worker = std::thread::Builder::new()
-            .name("vasos-replay".to_owned())
-            .spawn(move || player.run())
-            .expect("the system can start a thread");
-        Self { commands, blocks, events, latest, worker: Some(worker) }
+        let worker = std::thread::Builder::new().name(name.to_owned()).spawn(work);
+        self.worker = Some(worker.expect("the system can start a thread"));
+        self
     }
 
     /// Sends a command without waiting; false when the queue is full or the worker gone, and the command

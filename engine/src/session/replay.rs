@@ -3,34 +3,25 @@
 //! The reader gets all rows and events at once; what moves is the time that the snapshots stand at. Values come from
 //! the recording; laws, gains, modes and faults from carrying the recorded commands out on loops that never step.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use crossbeam_channel::RecvTimeoutError;
 
 use super::command::{CommandError, RigCommand};
 use super::event::{Alarm, Event, EventKind};
 use super::recorded::RecordedRun;
 use super::sink::{RunStart, Sink};
 use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
-use super::{Notify, SessionCommand};
-use crate::control::{Bound, ControlOutput, Limits, Mode};
+use super::{Ports, SessionCommand};
+use crate::control::{ControlOutput, Limits, Mode};
 use crate::daq::ReplayedRig;
 use crate::plant::{Balance, Fault, Measurement, ReadingStatus};
-use crate::signal::{ChannelKind, SampleBlock};
+use crate::signal::ChannelKind;
 use crate::sim::{ActiveLoop, ClosedLoop};
 
 /// Between two looks at the clock while the recording plays.
 const TICK: Duration = Duration::from_millis(16);
-
-/// What a player shares with its handle.
-pub(super) struct Ports {
-    pub commands: Receiver<SessionCommand>,
-    pub blocks: Sender<SampleBlock>,
-    pub events: Sender<Event>,
-    pub latest: Arc<Mutex<Arc<Snapshot>>>,
-    pub notify: Notify,
-}
 
 /// Plays a recording.
 pub(super) struct Player {
@@ -302,13 +293,6 @@ fn moves_itself(command: &RigCommand) -> bool {
 
 fn loop_now(l: &ActiveLoop, [setpoint_cm, pv_cm, mv]: [f64; 3], status: ReadingStatus) -> LoopNow {
     let limits = l.control.limits();
-    let at_limit = if mv >= limits.high {
-        Some(Bound::High)
-    } else if mv <= limits.low {
-        Some(Bound::Low)
-    } else {
-        None
-    };
     let mode: Mode = l.control.mode;
     LoopNow {
         tag: l.spec.id.clone(),
@@ -323,7 +307,7 @@ fn loop_now(l: &ActiveLoop, [setpoint_cm, pv_cm, mv]: [f64; 3], status: ReadingS
         mv,
         range: Limits { low: l.range.low, high: l.range.high },
         limits,
-        at_limit,
+        at_limit: limits.reached(mv),
         mode,
         actual: mode,
         law: *l.control.law(),

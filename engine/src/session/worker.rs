@@ -11,7 +11,7 @@ use super::command::CommandError;
 use super::event::{Event, EventKind};
 use super::sink::{RunStart, Sink};
 use super::snapshot::{LoopNow, PumpNow, Snapshot, TankNow, ValveNow};
-use super::{Notify, Rig, SessionCommand};
+use super::{Notify, Ports, Rig, SessionCommand};
 use crate::control::Limits;
 use crate::excitation::{Progress, StopReason};
 use crate::plant::{Measurement, Plant};
@@ -55,15 +55,6 @@ pub(super) struct Worker {
     latest: Arc<Mutex<Arc<Snapshot>>>,
     notify: Notify,
     changed: bool,
-}
-
-/// What the worker shares with its handle.
-pub(super) struct Ports {
-    pub commands: Receiver<SessionCommand>,
-    pub blocks: Sender<SampleBlock>,
-    pub events: Sender<Event>,
-    pub latest: Arc<Mutex<Arc<Snapshot>>>,
-    pub notify: Notify,
 }
 
 impl Worker {

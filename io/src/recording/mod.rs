@@ -192,12 +192,6 @@ impl Recording {
         self.status.lost.load(Ordering::Relaxed)
     }
 
-    /// Messages that the file did not take, because the disk was full or gone.
-    #[must_use]
-    pub fn unwritten(&self) -> u64 {
-        self.status.unwritten.load(Ordering::Relaxed)
-    }
-
     /// What can still be asked when the recording is closed.
     #[must_use]
     pub fn tally(&self) -> Tally {
@@ -273,7 +267,7 @@ impl Tally {
         self.0.lost.load(Ordering::Relaxed)
     }
 
-    /// Messages that the file did not take.
+    /// Messages that the file did not take, because the disk was full or gone.
     #[must_use]
     pub fn unwritten(&self) -> u64 {
         self.0.unwritten.load(Ordering::Relaxed)
