@@ -93,7 +93,7 @@ pub fn of_event(event: &Event) -> Entry {
                 (Weight::Alarm, tr!("event.excitation_stopped", tag = report.tag, reason = reason), None)
             }
         },
-        EventKind::Recorded { words } => (Weight::Note, words.clone(), None),
+        EventKind::Recorded { words, .. } => (Weight::Note, words.clone(), None),
         EventKind::SamplesLost { count } => (Weight::Alarm, tr!("event.samples_lost", count = count), None),
         EventKind::EventsLost { count } => (Weight::Alarm, tr!("event.events_lost", count = count), None),
         EventKind::Stopped { reason } => (Weight::Alarm, tr!("event.stopped", reason = reason), None),

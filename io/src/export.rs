@@ -3,7 +3,7 @@
 //! [`write_run`] writes the columns of `vasos simulate`: `time_s`, `sp`, `pv`, `mv`, and signals with their unit
 //! (`h1_cm`). [`write_columns`] adds the unit to the first three as well (`pv_cm`): there is no scenario beside them
 //! that says it. In Parquet every column has its unit as metadata `unit` too. Full precision; a value that does not
-//! exist is an empty cell, or null.
+//! exist is an empty cell, or null. [`write_recorded`] adds the mode of each loop as `mode`: MAN, AUTO or CAS.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -13,9 +13,11 @@ use std::sync::Arc;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
-use rerun::external::arrow::array::{ArrayRef, Float64Array, RecordBatch};
+use rerun::external::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use rerun::external::arrow::datatypes::{DataType, Field, Schema};
-use vasos_engine::signal::{Channel, ChannelSet, SampleBlock};
+use vasos_engine::control::Mode;
+use vasos_engine::session::RecordedRun;
+use vasos_engine::signal::{Channel, ChannelSet};
 use vasos_engine::sim::Run;
 
 use crate::rig::FileError;
@@ -31,6 +33,8 @@ struct Columns<'a> {
     heads: Vec<(String, &'a str)>,
     time_s: &'a [f64],
     value: &'a dyn Fn(usize, usize) -> f64,
+    /// Name and word of each row, of columns behind the numbers.
+    words: Vec<(String, Vec<&'static str>)>,
 }
 
 /// Writes a run under the names of `vasos simulate`; the name ends in `.csv` or `.parquet`.
@@ -41,20 +45,33 @@ pub fn write_run(run: &Run, path: &Path) -> Result<(), FileError> {
     let width = run.channels.len();
     let heads = run.channels.channels.iter().map(|c| (c.name.clone(), c.unit)).collect();
     let value = |row: usize, column: usize| run.values[row * width + column];
-    write(&Columns { heads, time_s: &run.time_s, value: &value }, path)
+    write(&Columns { heads, time_s: &run.time_s, value: &value, words: vec![] }, path)
 }
 
-/// Writes the rows of a recording or a session, every name with its unit.
+/// Writes the rows of a recording, every name with its unit, and the modes of its loops.
 ///
 /// # Errors
 /// As [`write_run`].
-pub fn write_rows(rows: &SampleBlock, path: &Path) -> Result<(), FileError> {
+pub fn write_recorded(run: &RecordedRun, path: &Path) -> Result<(), FileError> {
+    let rows = &run.rows;
     let width = rows.channels.len();
     let value = |row: usize, column: usize| rows.values[row * width + column];
-    write(&Columns { heads: heads(&rows.channels), time_s: &rows.time_s, value: &value }, path)
+    let words = mode_columns(run);
+    write(&Columns { heads: heads(&rows.channels), time_s: &rows.time_s, value: &value, words }, path)
 }
 
-/// Writes columns as [`write_rows`] does; each has a value for every time.
+/// Name and words of the modes of each loop slot of a recording; an empty word while a slot has no loop.
+#[must_use]
+pub fn mode_columns(run: &RecordedRun) -> Vec<(String, Vec<&'static str>)> {
+    let modes = run.modes();
+    let several = modes.len() > 1;
+    let name = |slot: usize| if several { format!("mode{}", slot + 1) } else { "mode".to_owned() };
+    let words =
+        |modes: Vec<Option<Mode>>| modes.into_iter().map(|mode| mode.map_or("", Mode::word)).collect();
+    modes.into_iter().enumerate().map(|(slot, modes)| (name(slot), words(modes))).collect()
+}
+
+/// Writes columns with names that end in their units; each has a value for every time.
 ///
 /// # Errors
 /// As [`write_run`].
@@ -65,7 +82,7 @@ pub fn write_columns(
     path: &Path,
 ) -> Result<(), FileError> {
     let value = |row: usize, column: usize| columns[column][row];
-    write(&Columns { heads: heads(channels), time_s, value: &value }, path)
+    write(&Columns { heads: heads(channels), time_s, value: &value, words: vec![] }, path)
 }
 
 /// Names with units, and the units.
@@ -115,12 +132,14 @@ fn shown_time(time_s: f64) -> f64 {
 
 fn write_csv(columns: &Columns, path: &Path) -> csv::Result<()> {
     let mut writer = csv::Writer::from_path(path)?;
-    writer.write_record(std::iter::once("time_s").chain(columns.heads.iter().map(|h| h.0.as_str())))?;
+    let names = columns.heads.iter().map(|h| &h.0).chain(columns.words.iter().map(|w| &w.0));
+    writer.write_record(std::iter::once("time_s").chain(names.map(String::as_str)))?;
     let cell = |v: f64| if v.is_nan() { String::new() } else { format!("{v}") };
     for (row, &time_s) in columns.time_s.iter().enumerate() {
         let time = format!("{}", shown_time(time_s));
         let values = (0..columns.heads.len()).map(|column| cell((columns.value)(row, column)));
-        writer.write_record(std::iter::once(time).chain(values))?;
+        let words = columns.words.iter().map(|(_, words)| words[row].to_owned());
+        writer.write_record(std::iter::once(time).chain(values).chain(words))?;
     }
     Ok(writer.flush()?)
 }
@@ -131,7 +150,9 @@ fn write_parquet(columns: &Columns, path: &Path) -> parquet::errors::Result<()> 
         let unit = HashMap::from([(UNIT.to_owned(), unit.to_owned())]);
         Field::new(name, DataType::Float64, true).with_metadata(unit)
     };
-    let schema = Arc::new(Schema::new(heads.map(field).collect::<Vec<_>>()));
+    let word_field = |(name, _): &(String, _)| Field::new(name, DataType::Utf8, true);
+    let fields = heads.map(field).chain(columns.words.iter().map(word_field));
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let properties = WriterProperties::builder().set_compression(Compression::ZSTD(ZstdLevel::default()));
     let mut writer = ArrowWriter::try_new(File::create(path)?, schema.clone(), Some(properties.build()))?;
     let rows = columns.time_s.len();
@@ -142,6 +163,10 @@ fn write_parquet(columns: &Columns, path: &Path) -> parquet::errors::Result<()> 
         for column in 0..columns.heads.len() {
             let values = batch.clone().map(|row| Some((columns.value)(row, column)).filter(|v| !v.is_nan()));
             arrays.push(Arc::new(values.collect::<Float64Array>()));
+        }
+        for (_, words) in &columns.words {
+            let words = words[batch.clone()].iter().map(|word| Some(*word).filter(|word| !word.is_empty()));
+            arrays.push(Arc::new(words.collect::<StringArray>()));
         }
         writer.write(&RecordBatch::try_new(schema.clone(), arrays)?)?;
     }

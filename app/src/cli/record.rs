@@ -30,8 +30,9 @@ Examples:
   vasos record run.toml -o run.rrd --part-mb 100      a scenario, with its start and its commands
 A viewer joins while it runs: rerun --connect ADDRESS, with the address that is printed at the start. What goes wrong is
 said on standard error at once; the run goes on. A recording that grows over --part-mb goes on in run-2.rrd, run-3.rrd, …
-JSON: {files, bytes, rows, lost, unwritten, end_time_s}; lost: rows that the recorder could not take, unwritten: batches
-that the disk did not take. Either makes the exit status 1.")]
+JSON: {files, bytes, rows, lost, lost_events, unwritten, end_time_s}; lost, lost_events: rows and events that the recorder
+could not take, unwritten: batches that the disk did not take. Each of them makes the exit status 1, and so does a recording
+without a row.")]
 pub struct Arguments {
     /// Preset, rig file or scenario file (TOML).
     #[arg(default_value = "stad")]
@@ -177,18 +178,23 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     let closed = recording.close();
     // The last rows may have begun another file, or found the disk full.
     let (rows, lost, unwritten, files) = (tally.rows(), tally.lost(), tally.unwritten(), tally.parts());
+    let lost_events = tally.lost_events();
     let bytes: u64 = files.iter().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
     let names: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
     let text = if arguments.json {
         json::text(&json!({
-            "files": names, "bytes": bytes, "rows": rows, "lost": lost, "unwritten": unwritten,
-            "end_time_s": end_time_s,
+            "files": names, "bytes": bytes, "rows": rows, "lost": lost, "lost_events": lost_events,
+            "unwritten": unwritten, "end_time_s": end_time_s,
         }))
     } else {
         format!("{rows} rows to {end_time_s} s in {bytes} bytes: {}", names.join(", "))
     };
-    let remarks: Vec<String> = closed.err().map(|trouble| trouble.to_string()).into_iter().collect();
-    let status = u8::from(lost > 0 || unwritten > 0 || !remarks.is_empty() || refusals > 0);
+    let mut remarks: Vec<String> = closed.err().map(|trouble| trouble.to_string()).into_iter().collect();
+    if rows == 0 {
+        remarks.push("nothing was recorded: the run ended before its first sample".to_owned());
+    }
+    let missing = lost > 0 || lost_events > 0 || unwritten > 0;
+    let status = u8::from(missing || !remarks.is_empty() || refusals > 0);
     Ok(Answer { text, remarks, status })
 }
 

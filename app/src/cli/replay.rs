@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use vasos_engine::control::LoopSpec;
 use vasos_engine::session::{RecordedRun, Session, SessionCommand};
-use vasos_io::export::{with_unit, write_rows};
+use vasos_io::export::{mode_columns, with_unit, write_recorded};
 use vasos_io::recording::viewer::{self, Shown};
 use vasos_io::recording::{Parts, Recorded, event_words, read_recorded};
 
@@ -83,7 +83,7 @@ fn answer(arguments: &Arguments, recorded: &Recorded, flaws: &[String]) -> Resul
     }
     if let Some(path) = &arguments.output {
         let index = one.unwrap_or(longest);
-        write_rows(&runs[index].rows, path).map_err(Refusal::of)?;
+        write_recorded(&runs[index], path).map_err(Refusal::of)?;
         let text = format!(
             "run {} of {}: {} rows of {} columns, written to {}",
             index + 1,
@@ -97,7 +97,14 @@ fn answer(arguments: &Arguments, recorded: &Recorded, flaws: &[String]) -> Resul
                 json!({ "run": index + 1, "rows": runs[index].len(), "output": path.display().to_string() });
             return Ok(Answer::done(json::text(&shown)));
         }
-        return Ok(Answer::done(text));
+        let mut answer = Answer::done(text);
+        if runs[index].is_empty() {
+            answer
+                .remarks
+                .push("the run has no rows: the file holds nothing but the names of its columns".to_owned());
+            answer.status = 1;
+        }
+        return Ok(answer);
     }
     let chosen: Vec<(usize, &RecordedRun)> =
         runs.iter().enumerate().filter(|(i, _)| one.is_none_or(|one| one == *i)).collect();
@@ -219,7 +226,9 @@ fn play(run: Arc<RecordedRun>, speed: f64) -> Result<Answer, Refusal> {
     }
     let done = || Ok(Answer::done(String::new()));
     let mut out = std::io::stdout().lock();
-    let names: Vec<String> = run.channels().channels.iter().map(with_unit).collect();
+    let modes = mode_columns(&run);
+    let mode_names = modes.iter().map(|(name, _)| name.clone());
+    let names: Vec<String> = run.channels().channels.iter().map(with_unit).chain(mode_names).collect();
     if writeln!(out, "time_s,{}", names.join(",")).is_err() {
         return done();
     }
@@ -234,7 +243,8 @@ fn play(run: Arc<RecordedRun>, speed: f64) -> Result<Answer, Refusal> {
         let now = session.snapshot();
         while next < run.len() && run.rows.time_s[next] <= now.time_s {
             let cell = |v: &f64| if v.is_nan() { String::new() } else { v.to_string() };
-            let cells: Vec<String> = run.rows.row(next).iter().map(cell).collect();
+            let mode_cells = modes.iter().map(|(_, words)| words[next].to_owned());
+            let cells: Vec<String> = run.rows.row(next).iter().map(cell).chain(mode_cells).collect();
             let time_s = (run.rows.time_s[next] * 1e9).round() / 1e9;
             if writeln!(out, "{time_s},{}", cells.join(",")).and_then(|()| out.flush()).is_err() {
                 return done();

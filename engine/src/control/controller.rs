@@ -17,6 +17,16 @@ pub enum Mode {
 }
 
 impl Mode {
+    /// As a plant's log writes it.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Manual => "MAN",
+            Self::Automatic => "AUTO",
+            Self::Cascade => "CAS",
+        }
+    }
+
     /// Whether the controller writes the output.
     #[must_use]
     pub fn is_controlling(self) -> bool {

@@ -294,6 +294,12 @@ impl Signal {
         }
     }
 
+    /// Whether the loop's controller goes on to write its output.
+    #[must_use]
+    pub fn keeps_loop(&self) -> bool {
+        matches!(self, Self::SetpointStep { .. } | Self::UltimateGain(_))
+    }
+
     /// Farthest deviations of the output from its value at rest that the signal asks for, in MV units.
     #[must_use]
     pub fn reach(&self) -> [f64; 2] {

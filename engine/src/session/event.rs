@@ -113,6 +113,8 @@ pub enum EventKind {
     Recorded {
         /// The words.
         words: String,
+        /// Tag of the loop whose test ended with it.
+        test_over: Option<String>,
     },
     /// Samples nobody fetched were given up.
     SamplesLost {

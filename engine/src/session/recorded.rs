@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use super::event::Event;
+use super::replay;
+use crate::control::Mode;
 use crate::model::ProcessModel;
 use crate::plant::{Measurement, Network};
 use crate::signal::{ChannelSet, SampleBlock};
@@ -64,6 +66,13 @@ impl RecordedRun {
     pub fn row_at(&self, time_s: f64) -> Option<usize> {
         let after = self.rows.time_s.partition_point(|&t| t <= time_s);
         (!self.is_empty()).then(|| after.saturating_sub(1))
+    }
+
+    /// The mode of every loop slot at each row, a vector each: `None` while the slot has no loop, by hand while a test
+    /// moves the loop's output.
+    #[must_use]
+    pub fn modes(&self) -> Vec<Vec<Option<Mode>>> {
+        replay::modes(self)
     }
 
     /// Columns of its rows.

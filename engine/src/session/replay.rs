@@ -26,11 +26,7 @@ const TICK: Duration = Duration::from_millis(16);
 /// Plays a recording.
 pub(super) struct Player {
     recorded: Arc<RecordedRun>,
-    /// Loops as the commands up to `next_event` have set them.
-    loops: ClosedLoop,
-    next_event: usize,
-    /// Alarms that are on.
-    alarms: Vec<Alarm>,
+    followed: Followed,
     /// Time that is shown, in seconds of the run.
     time_s: f64,
     running: bool,
@@ -43,9 +39,7 @@ impl Player {
     pub fn new(recorded: Arc<RecordedRun>, ports: Ports) -> Self {
         let [start_s, _] = recorded.span_s();
         let mut player = Self {
-            loops: fresh(&recorded),
-            next_event: 0,
-            alarms: vec![],
+            followed: Followed::new(&recorded),
             time_s: start_s,
             running: false,
             speed: 1.0,
@@ -53,7 +47,7 @@ impl Player {
             recorded,
             ports,
         };
-        player.catch_up();
+        player.followed.follow(&player.recorded, start_s);
         player
     }
 
@@ -160,33 +154,10 @@ impl Player {
             return;
         }
         if time_s < self.time_s {
-            self.loops = fresh(&self.recorded);
-            self.next_event = 0;
-            self.alarms.clear();
+            self.followed = Followed::new(&self.recorded);
         }
         self.time_s = time_s;
-        self.catch_up();
-    }
-
-    /// Carries out what happened up to the present time.
-    fn catch_up(&mut self) {
-        while let Some(event) = self.recorded.events.get(self.next_event).filter(|e| e.time_s <= self.time_s)
-        {
-            self.next_event += 1;
-            match &event.kind {
-                // Tests move a loop over its settings and leave them as they were.
-                EventKind::Done(RigCommand::SteadyAt { tag, level_cm }) => {
-                    let setpoint = RigCommand::Setpoint { tag: tag.clone(), level_cm: *level_cm };
-                    drop(self.loops.apply(&setpoint));
-                }
-                EventKind::Done(command) if !moves_itself(command) => drop(self.loops.apply(command)),
-                EventKind::Alarm(alarm, true) if !self.alarms.contains(alarm) => {
-                    self.alarms.push(alarm.clone());
-                }
-                EventKind::Alarm(alarm, false) => self.alarms.retain(|on| on != alarm),
-                _ => {}
-            }
-        }
+        self.followed.follow(&self.recorded, time_s);
     }
 
     fn publish(&self) {
@@ -204,7 +175,7 @@ impl Player {
             let column = recorded.channels().column(kind);
             row.zip(column).map_or(f64::NAN, |(row, column)| recorded.rows.row(row)[column])
         };
-        let (network, loops) = (recorded.network.clone(), &self.loops);
+        let (network, loops) = (recorded.network.clone(), &self.followed.loops);
         let tank = |i| TankNow {
             level_cm: value(ChannelKind::Level(i)),
             spill_cm3_s: value(ChannelKind::Spill(i)),
@@ -242,7 +213,7 @@ impl Player {
                 .collect(),
             balance: Balance::default(),
             balance_error_cm3: 0.0,
-            alarms: self.alarms.clone(),
+            alarms: self.followed.alarms.clone(),
             faults: loops.source().faults().to_vec(),
             excitation: None,
             span_s: Some(recorded.span_s()),
@@ -254,7 +225,7 @@ impl Player {
     fn status(&self, sensor: usize) -> ReadingStatus {
         let tag = &self.recorded.network.spec.sensors[sensor].id;
         let of = |alarm: &&Alarm| alarm.tag() == tag;
-        match self.alarms.iter().find(of) {
+        match self.followed.alarms.iter().find(of) {
             Some(Alarm::SensorFault { .. }) => ReadingStatus::Broken,
             Some(Alarm::BelowRange { .. }) => ReadingStatus::BelowRange,
             Some(Alarm::AboveRange { .. }) => ReadingStatus::AboveRange,
@@ -265,7 +236,7 @@ impl Player {
     /// k √h of the leaks that are open.
     fn leak_cm3_s(&self, tank: usize, level_cm: f64) -> f64 {
         let tag = &self.recorded.network.spec.tanks[tank].id;
-        let leaks = self.loops.source().faults().iter().filter(|f| f.tag == *tag);
+        let leaks = self.followed.loops.source().faults().iter().filter(|f| f.tag == *tag);
         let of = |fault: &Fault| match fault {
             Fault::Leak { k_cm2_5_s } => k_cm2_5_s * level_cm.max(0.0).sqrt(),
             _ => 0.0,
@@ -275,8 +246,70 @@ impl Player {
 
     fn is_dry(&self, pump: usize) -> bool {
         let tag = &self.recorded.network.spec.pumps[pump].id;
-        self.alarms.iter().any(|alarm| matches!(alarm, Alarm::PumpDry { .. }) && alarm.tag() == tag)
+        self.followed.alarms.iter().any(|alarm| matches!(alarm, Alarm::PumpDry { .. }) && alarm.tag() == tag)
     }
+}
+
+/// What the events of a recording have come to at a time.
+struct Followed {
+    /// Loops as the commands up to `next_event` have set them.
+    loops: ClosedLoop,
+    next_event: usize,
+    /// Alarms that are on.
+    alarms: Vec<Alarm>,
+    /// Loops whose output a test moves.
+    tested: Vec<String>,
+}
+
+impl Followed {
+    fn new(recorded: &RecordedRun) -> Self {
+        Self { loops: fresh(recorded), next_event: 0, alarms: vec![], tested: vec![] }
+    }
+
+    /// Carries out what happened up to a time in seconds.
+    fn follow(&mut self, recorded: &RecordedRun, time_s: f64) {
+        while let Some(event) = recorded.events.get(self.next_event).filter(|e| e.time_s <= time_s) {
+            self.next_event += 1;
+            match &event.kind {
+                // Tests move a loop over its settings and leave them as they were.
+                EventKind::Done(RigCommand::Excite { tag, excitation })
+                    if !excitation.signal.keeps_loop() =>
+                {
+                    self.tested.push(tag.clone());
+                }
+                EventKind::Recorded { test_over: Some(tag), .. } => self.tested.retain(|t| t != tag),
+                EventKind::Done(RigCommand::SteadyAt { tag, level_cm }) => {
+                    let setpoint = RigCommand::Setpoint { tag: tag.clone(), level_cm: *level_cm };
+                    drop(self.loops.apply(&setpoint));
+                }
+                EventKind::Done(command) if !moves_itself(command) => drop(self.loops.apply(command)),
+                EventKind::Alarm(alarm, true) if !self.alarms.contains(alarm) => {
+                    self.alarms.push(alarm.clone());
+                }
+                EventKind::Alarm(alarm, false) => self.alarms.retain(|on| on != alarm),
+                _ => {}
+            }
+        }
+    }
+
+    /// Mode of a loop; by hand while a test moves its output.
+    fn mode(&self, slot: usize) -> Option<Mode> {
+        let l = self.loops.loops().get(slot)?;
+        Some(if self.tested.contains(&l.spec.id) { Mode::Manual } else { l.control.mode })
+    }
+}
+
+/// The mode of every loop slot at each row: `None` while the slot has no loop.
+pub(super) fn modes(recorded: &RecordedRun) -> Vec<Vec<Option<Mode>>> {
+    let mut followed = Followed::new(recorded);
+    let mut modes = vec![Vec::with_capacity(recorded.len()); recorded.channels().slots];
+    for &time_s in &recorded.rows.time_s {
+        followed.follow(recorded, time_s);
+        for (slot, modes) in modes.iter_mut().enumerate() {
+            modes.push(followed.mode(slot));
+        }
+    }
+    modes
 }
 
 /// The loops of a recording as they were at its beginning.

@@ -43,6 +43,7 @@ pub(super) fn is_unit_row(fields: &[String]) -> bool {
 /// told apart.
 pub(super) fn read_names(header: &[String], units: Option<&[String]>) -> Vec<ColumnName> {
     let mut names: Vec<ColumnName> = Vec::new();
+    let is_export = header.iter().any(|name| name.trim() == "time_s");
     for (i, text) in header.iter().enumerate() {
         let (mut name, mut unit) = name_and_unit(text);
         if let Some(below) = units.and_then(|u| u.get(i)).map(|u| bare(u)).filter(|u| !u.is_empty()) {
@@ -50,6 +51,9 @@ pub(super) fn read_names(header: &[String], units: Option<&[String]>) -> Vec<Col
             if unit.is_none() && !title.starts_with("unit") && !title.starts_with("unidade") {
                 unit = Some(below.to_owned());
             }
+        }
+        if unit.is_none() && is_export {
+            unit = exported_unit(&name).map(str::to_owned);
         }
         if name.is_empty() {
             name = format!("column {}", i + 1);
@@ -64,6 +68,12 @@ pub(super) fn read_names(header: &[String], units: Option<&[String]>) -> Vec<Col
         names.push(ColumnName { name: unique, unit });
     }
     names
+}
+
+/// Unit at the end of a name in a file of this program's own, such as `h1_cm`.
+fn exported_unit(name: &str) -> Option<&'static str> {
+    let endings = [("_cm3_s", "cm³/s"), ("_cm", "cm"), ("_v", "V"), ("_percent", "%"), ("_deg", "°")];
+    endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| unit)
 }
 
 fn bare(text: &str) -> &str {

@@ -6,7 +6,8 @@ use super::assemble::Source;
 use super::merge::{Point, Series, merge};
 use super::read::{Kind, Read, ReadColumn};
 use super::{FileFormat, ImportError, Repair};
-use crate::recording::{Parts, Recorded, RecordedColumn, RecordingError, read_recorded, read_recording};
+use crate::export::mode_columns;
+use crate::recording::{Parts, Recorded, RecordedColumn, RecordingError, read_columns, read_recorded};
 use vasos_engine::session::RecordedRun;
 
 /// Names of the values of a loop's component, in their order.
@@ -36,7 +37,8 @@ pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, 
         }
         return Ok(read_rows(run));
     }
-    let all = read_recording(path).map_err(|error| ImportError::Read { reason: error.to_string() })?;
+    let (all, flaw) = read_columns(path).map_err(|error| ImportError::Read { reason: error.to_string() })?;
+    repairs.extend(flaw.map(|flaw| Repair::Recording { flaw }));
     let numeric = |c: &&RecordedColumn| c.values.iter().any(|v| !v.is_empty());
     let mut runs: Vec<&str> = all.iter().filter(numeric).map(|c| c.recording.as_str()).collect();
     runs.sort_unstable();
@@ -71,6 +73,13 @@ fn read_rows(run: &RecordedRun) -> (Read, Source) {
     let mut columns = vec![column("time".to_owned(), "s", run.rows.time_s.clone())];
     for (index, channel) in run.channels().channels.iter().enumerate() {
         columns.push(column(channel.name.clone(), channel.unit, run.rows.column(index).collect()));
+    }
+    for (name, words) in mode_columns(run) {
+        let mut column = ReadColumn::new(name, None, Kind::Words, vec![]);
+        // A word of a slot without a loop is a value that does not exist.
+        let mut state = |word: &str| if word.is_empty() { None } else { column.state(word) };
+        column.values = words.iter().map(|word| state(word).map_or(f64::NAN, f64::from)).collect();
+        columns.push(column);
     }
     let lines = (1..=run.len() as u32).collect();
     let source = Source { format: FileFormat::Recording, header_line: None, first_data_line: 1 };

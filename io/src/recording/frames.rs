@@ -14,6 +14,8 @@ use rerun::external::arrow::ipc::root_as_message;
 use rerun::external::re_log_encoding::Decoder;
 use rerun::log::LogMsg;
 
+use super::trouble::RecordingFlaw;
+
 /// Bytes of the file's header.
 const HEADER: usize = 12;
 /// Bytes in front of a message.
@@ -52,6 +54,16 @@ pub(super) struct Damage {
 }
 
 impl Damage {
+    /// What is to be said of it; `None` where nothing is wrong.
+    pub(super) fn flaw(&self, path: &Path) -> Option<RecordingFlaw> {
+        let (path, at) = (path.display().to_string(), self.at.unwrap_or_default());
+        match self {
+            Self { messages: 0, .. } => None,
+            Self { cut: true, messages: 1, .. } => Some(RecordingFlaw::Cut { path, at }),
+            Self { messages, .. } => Some(RecordingFlaw::Damaged { path, at, messages: *messages }),
+        }
+    }
+
     fn add(&mut self, at: usize) {
         self.messages += 1;
         self.at = self.at.or(Some(at as u64));

@@ -16,6 +16,7 @@
 //! | `/models` | `TextDocument`, `model` | the model that came into use: in words, and as TOML with its units | – | as it happens |
 //! | `/fits/model_N` | `Scalars` | PV as measured, PV of the model | the PV's | once a fit |
 //! | `/nyquist/…` | `LineStrips2D`, `Points2D` | L(jω), unit circle, circle of Ms, −1; −Im L points up | 1 | when the loop changes |
+//! | `/checks` | `rows` | check sums of the rows and events since the last one, as TOML | – | every half minute, and at the end |
 //! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, one in two seconds at real time, when a level moves |
 //! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
 //! | `/__properties/vasos` | text | `rig`, `run`, `program`; `rig_file`: the rig as it was set when the run began, a TOML rig file with the loops' laws, gains, setpoints and modes; `start`: configuration and imperfections | – | once |
@@ -32,6 +33,9 @@
 //! A recording that grows over [`RecordingOptions::part_bytes`] goes on in another file. Each part opens by itself: it
 //! begins with the blueprint, the drawing, the settings and every command so far. Opened together, in the viewer or by
 //! [`read_runs`], parts are one recording.
+//!
+//! Rows have check sums on `/checks`, and every text above that is TOML ends with one in a comment: what was changed on
+//! a disk is said when it is read. Up to half a minute before the recorder was killed has none.
 
 mod frames;
 mod layout;
@@ -41,6 +45,7 @@ mod output;
 mod play;
 mod read;
 mod run_sink;
+mod seal;
 mod status;
 mod tanks;
 mod tidy;
@@ -56,7 +61,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use rerun::grpc_server::GrpcServerSink;
 use rerun::{MemoryLimit, ServerOptions};
 use vasos_engine::session::Sink;
@@ -64,7 +69,7 @@ use vasos_engine::session::Sink;
 pub use layout::{EVENTS, FITS, FLOWS, LEVELS, MODELS, NYQUIST, RIG, SIGNALS, TIME, WALL_CLOCK};
 pub use notes::{ModelNote, Note, NyquistNote};
 pub use play::{Parts, Recorded, read_recorded, read_runs};
-pub use read::{RecordedColumn, read_recording};
+pub use read::{RecordedColumn, read_columns, read_recording};
 pub use trouble::{RecordingError, RecordingFlaw, RecordingTrouble};
 pub use words::line as event_words;
 
@@ -111,6 +116,7 @@ pub struct Recording {
     done: Receiver<()>,
     notes: Option<Sender<Message>>,
     lost_reported: u64,
+    lost_events_reported: u64,
     behind_reported: u64,
 }
 
@@ -146,7 +152,18 @@ impl Recording {
         let sink = Box::new(RunSink { queue, status: status.clone() });
         let id = output::next_id();
         let path = path.to_owned();
-        Ok((Self { id, path, address, status, done, notes, lost_reported: 0, behind_reported: 0 }, sink))
+        let recording = Self {
+            id,
+            path,
+            address,
+            status,
+            done,
+            notes,
+            lost_reported: 0,
+            lost_events_reported: 0,
+            behind_reported: 0,
+        };
+        Ok((recording, sink))
     }
 
     /// Number unique in this process, for attaching and detaching the sink.
@@ -167,10 +184,12 @@ impl Recording {
         self.status.parts()
     }
 
-    /// Keeps something with the present run, at its present time. What comes while the recorder is behind is left out.
+    /// Keeps something with the present run, at its present time. What comes while the recorder is behind is left out and
+    /// counted.
     pub fn note(&self, note: Note) {
         if let Some(notes) = &self.notes {
-            drop(notes.try_send(Message::Note(Box::new(note))));
+            let full = matches!(notes.try_send(Message::Note(Box::new(note))), Err(TrySendError::Full(_)));
+            self.status.lost_events.fetch_add(u64::from(full), Ordering::Relaxed);
         }
     }
 
@@ -211,6 +230,11 @@ impl Recording {
         if lost > self.lost_reported {
             troubles.push(RecordingTrouble::RowsLost { count: lost - self.lost_reported });
             self.lost_reported = lost;
+        }
+        let lost = self.status.lost_events.load(Ordering::Relaxed);
+        if lost > self.lost_events_reported {
+            troubles.push(RecordingTrouble::EventsLost { count: lost - self.lost_events_reported });
+            self.lost_events_reported = lost;
         }
         let behind = self.status.behind.load(Ordering::Relaxed);
         if behind > self.behind_reported {
@@ -265,6 +289,12 @@ impl Tally {
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.0.lost.load(Ordering::Relaxed)
+    }
+
+    /// Events and notes that the recorder could not take.
+    #[must_use]
+    pub fn lost_events(&self) -> u64 {
+        self.0.lost_events.load(Ordering::Relaxed)
     }
 
     /// Messages that the file did not take, because the disk was full or gone.

@@ -4,6 +4,7 @@ use rerun::{Color, LineStrips2D, Points2D, RecordingStream, Scalars, SeriesLines
 use vasos_engine::model::ProcessModel;
 
 use super::layout::{FITS, MODELS, NYQUIST, TIME};
+use super::seal::sealed;
 use super::told::ToldModel;
 
 /// A model that came into use, with the fit that gave it.
@@ -52,23 +53,29 @@ const CIRCLE: usize = 128;
 /// Part of the plane that is of use around −1.
 const FRAME: f64 = 3.0;
 
-/// Logs a note at a time of the run, in seconds.
+/// Logs what a viewer shows of a note at a time of the run, in seconds.
 pub(super) fn log(stream: &RecordingStream, note: &Note, time_s: f64) -> LogResult {
     match note {
-        Note::Model(note) => log_model(stream, note, time_s),
+        Note::Model(note) => log_fit(stream, note),
         Note::Nyquist(note) => log_nyquist(stream, note, time_s),
     }
 }
 
-fn log_model(stream: &RecordingStream, note: &ModelNote, time_s: f64) -> LogResult {
+/// Logs the model of a note, which every further part of the recording needs.
+pub(super) fn log_model(stream: &RecordingStream, note: &ModelNote, time_s: f64) -> LogResult {
     stream.set_duration_secs(TIME, time_s);
     let told =
         ToldModel { pv_unit: note.pv_unit.clone(), mv_unit: note.mv_unit.clone(), model: note.model.clone() };
     stream.log(MODELS, &TextDocument::from_markdown(note.words.as_str()))?;
     let told = rerun::AnyValues::default()
-        .with_component::<rerun::components::Text>(MODEL, [toml::to_string(&told)?]);
+        .with_component::<rerun::components::Text>(MODEL, [sealed(&toml::to_string(&told)?, &[])]);
     stream.log(MODELS, &told)?;
     stream.reset_time();
+    Ok(())
+}
+
+/// Logs the rows of a fit.
+fn log_fit(stream: &RecordingStream, note: &ModelNote) -> LogResult {
     if note.rows.is_empty() {
         return Ok(());
     }

@@ -105,13 +105,15 @@ impl Output {
         }
     }
 
-    /// Goes on in a new file when this one has grown over a size; the one that is full is tidied up beside.
-    pub fn rotate_over(&self, most_bytes: u64) {
+    /// Whether the file has grown over a size; of a small part the opening would be all.
+    pub fn is_over(&self, most_bytes: u64) -> bool {
+        let disk = self.disk();
+        disk.good_bytes >= most_bytes.saturating_add(disk.opened_bytes)
+    }
+
+    /// Goes on in a new file; the one that is full is tidied up beside.
+    pub fn rotate(&self) {
         let mut disk = self.disk();
-        // Of a small part the opening would be all.
-        if disk.good_bytes < most_bytes.saturating_add(disk.opened_bytes) {
-            return;
-        }
         let next = match disk.next_part() {
             Ok(next) => next,
             Err(reason) => {

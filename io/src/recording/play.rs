@@ -17,7 +17,8 @@ use vasos_engine::signal::{ChannelSet, SampleBlock};
 use super::frames::{self, Damage};
 use super::layout::{EVENTS, MODELS, SIGNALS, TIME, TOLD, groups};
 use super::notes::MODEL;
-use super::told::{self, Beginning, ToldModel, event_kind};
+use super::seal::{self, CHECKS, Check, is_whole};
+use super::told::{self, Beginning, Heard, ToldModel, heard};
 use super::trouble::{RecordingError, RecordingFlaw};
 
 /// The files of a recording that goes on in several.
@@ -95,22 +96,16 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
         return Err(RecordingError::Nothing { path: first });
     }
     let used = used_parts(&stores);
-    let shown = |place: usize| parts.0[place].display().to_string();
     let mut flaws: Vec<RecordingFlaw> = damages
         .into_iter()
-        .filter(|(place, damage)| used.contains(place) && damage.messages > 0)
-        .map(|(place, damage)| {
-            let at = damage.at.unwrap_or_default();
-            match damage {
-                Damage { cut: true, messages: 1, .. } => RecordingFlaw::Cut { path: shown(place), at },
-                _ => RecordingFlaw::Damaged { path: shown(place), at, messages: damage.messages },
-            }
-        })
+        .filter(|(place, _)| used.contains(place))
+        .filter_map(|(place, damage)| damage.flaw(&parts.0[place]))
         .collect();
     let mut runs = vec![];
     for store in stores.into_iter().filter(|store| used.contains(&store.part)) {
-        if let Some(run) = store.run(&first)? {
+        if let Some((run, altered)) = store.run(&first)? {
             flaws.extend(gap(&run));
+            flaws.extend(altered);
             runs.push(run);
         }
     }
@@ -198,6 +193,7 @@ struct Store {
     /// Time, words, what is told.
     events: Vec<(i64, String, String)>,
     models: Vec<(i64, String)>,
+    checks: Vec<String>,
 }
 
 impl Store {
@@ -223,9 +219,10 @@ impl Store {
                 let models = times().unwrap_or_default().into_iter().zip(texts(chunk, MODEL));
                 self.models.extend(models.filter_map(|(time, text)| Some((time, text?))));
             }
+            CHECKS => self.checks.extend(texts(chunk, seal::ROWS).into_iter().flatten()),
             other if other == format!("__properties/{}", told::PROPERTY) => {
                 let first = |field: &str| texts(chunk, field).into_iter().flatten().next();
-                self.rig = first("rig").or(self.rig.take());
+                self.rig = first(told::RIG).or(self.rig.take());
                 self.rig_file = first(told::RIG_FILE).or(self.rig_file.take());
                 self.start = first(told::START).or(self.start.take());
                 self.number = first(told::RUN).or(self.number.take());
@@ -238,8 +235,8 @@ impl Store {
         }
     }
 
-    /// The run; `None` for a recording of something else.
-    fn run(mut self, path: &str) -> Result<Option<RecordedRun>, RecordingError> {
+    /// The run, and what of it is not as it was written; `None` for a recording of something else.
+    fn run(mut self, path: &str) -> Result<Option<(RecordedRun, Vec<RecordingFlaw>)>, RecordingError> {
         let unreadable = |reason: String| RecordingError::Read { path: path.to_owned(), reason };
         let network = match (&self.rig_file, &self.rig) {
             (Some(text), _) => {
@@ -259,34 +256,89 @@ impl Store {
             network.spec.configurations.iter().position(|c| c.id == beginning.configuration)
         });
         let number = self.number.as_deref().and_then(|n| n.parse().ok()).unwrap_or(0);
-        let mut events: Vec<Event> = self.take_events(number);
+        let mut altered_texts = self.altered_texts();
+        let heard = self.take_events();
+        altered_texts += heard.iter().filter(|(_, heard)| !heard.whole).count();
+        let numbers: HashSet<u64> = heard.iter().filter_map(|(_, heard)| heard.number).collect();
+        let mut events: Vec<Event> = heard
+            .into_iter()
+            .map(|(time, heard)| Event { run: number, time_s: time as f64 / 1e9, kind: heard.kind })
+            .collect();
         events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let mut models: Vec<RecordedModel> = self.models.iter().filter_map(recorded_model).collect();
         models.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         models.dedup();
-        Ok(Some(RecordedRun {
-            name: std::mem::take(&mut self.name),
+        let name = std::mem::take(&mut self.name);
+        let checks: Vec<Check> = self.checks.iter().filter_map(|text| toml::from_str(text).ok()).collect();
+        let (time_ns, rows) = block(self.rows, &network, number);
+        let mut flaws = altered_rows(&name, checks, &time_ns, &rows, &numbers);
+        if altered_texts > 0 {
+            flaws.push(RecordingFlaw::TextsAltered { run: name.clone(), texts: altered_texts });
+        }
+        let run = RecordedRun {
+            name,
             configuration: configuration.unwrap_or(0),
             measurement: beginning.and_then(|b| b.measurement),
-            rows: block(self.rows, &network, number),
+            rows,
             events,
             models,
             network,
-        }))
+        };
+        Ok(Some((run, flaws)))
     }
 
-    fn take_events(&mut self, run: u64) -> Vec<Event> {
+    /// Takes away the texts that are not as they were written, of checks and models; how many there are, with those of
+    /// the settings, which are kept.
+    fn altered_texts(&mut self) -> usize {
+        let before = self.checks.len() + self.models.len();
+        self.checks.retain(|text| is_whole(text, &[]));
+        self.models.retain(|(_, text)| is_whole(text, &[]));
+        let beside = [self.rig.as_deref().unwrap_or_default(), self.number.as_deref().unwrap_or_default()];
+        let settings = [
+            self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[])),
+            self.start.as_ref().is_some_and(|text| !is_whole(text, &beside)),
+        ];
+        before - self.checks.len() - self.models.len()
+            + settings.into_iter().filter(|altered| *altered).count()
+    }
+
+    /// Times in nanoseconds, and what is told at them.
+    fn take_events(&mut self) -> Vec<(i64, Heard)> {
         let mut seen: HashSet<(i64, String, String)> = HashSet::new();
         let all = std::mem::take(&mut self.events).into_iter();
         // Parts that were tidied up have the same events in other chunks.
         let once: Vec<_> = all.filter(|event| seen.insert(event.clone())).collect();
-        let event = |(time, words, told): (i64, String, String)| Event {
-            run,
-            time_s: time as f64 / 1e9,
-            kind: event_kind(&told, words),
-        };
-        once.into_iter().map(event).collect()
+        once.into_iter().map(|(time, words, told)| (time, heard(&told, words))).collect()
     }
+}
+
+/// Stretches of rows that are not what was summed up; those that follow each other are one.
+fn altered_rows(
+    name: &str,
+    mut checks: Vec<Check>,
+    time_ns: &[i64],
+    rows: &SampleBlock,
+    events: &HashSet<u64>,
+) -> Vec<RecordingFlaw> {
+    checks.sort_by_key(|check| check.from_ns);
+    // Parts that were tidied up have the same checks in other chunks.
+    checks.dedup();
+    let mut altered: Vec<[i64; 2]> = vec![];
+    let mut before_altered = false;
+    for check in checks {
+        let holds = check.holds(time_ns, |at| rows.row(at), events);
+        match altered.last_mut().filter(|_| before_altered) {
+            _ if holds => {}
+            Some(last) => last[1] = check.to_ns,
+            None => altered.push([check.from_ns, check.to_ns]),
+        }
+        before_altered = !holds;
+    }
+    let flaw = |[from_ns, to_ns]: [i64; 2]| {
+        let [from_s, to_s] = [from_ns, to_ns].map(|ns| ns as f64 / 1e9);
+        RecordingFlaw::RowsAltered { run: name.to_owned(), from_s, to_s }
+    };
+    altered.into_iter().map(flaw).collect()
 }
 
 fn recorded_model((time, text): &(i64, String)) -> Option<RecordedModel> {
@@ -329,17 +381,17 @@ fn rows_of(chunk: &Chunk, time_ns: Vec<i64>) -> Rows {
     Rows { time_ns, columns }
 }
 
-/// Rows in order of time, in the columns of the rig.
-fn block(mut parts: Vec<Rows>, network: &Network, run: u64) -> SampleBlock {
+/// Rows in order of time, in the columns of the rig; with them, their times in nanoseconds.
+fn block(mut parts: Vec<Rows>, network: &Network, run: u64) -> (Vec<i64>, SampleBlock) {
     let channels = Arc::new(ChannelSet::of(network));
     let groups = groups(&channels, network);
     parts.sort_by_key(|rows| rows.time_ns.first().copied());
     let count = parts.iter().map(|rows| rows.time_ns.len()).sum();
     let width = channels.len();
-    let (mut time_s, mut values) = (Vec::with_capacity(count), vec![f64::NAN; count * width]);
+    let (mut time_ns, mut values) = (Vec::with_capacity(count), vec![f64::NAN; count * width]);
     let mut ordered = true;
     for rows in &parts {
-        let first = time_s.len();
+        let first = time_ns.len();
         for group in &groups {
             let Some((_, of_row, cells)) = rows.columns.iter().find(|c| c.0 == group.component) else {
                 continue;
@@ -350,14 +402,15 @@ fn block(mut parts: Vec<Rows>, network: &Network, run: u64) -> SampleBlock {
                 }
             }
         }
-        time_s.extend(rows.time_ns.iter().map(|&ns| ns as f64 / 1e9));
-        ordered &= time_s[first.saturating_sub(1)..].is_sorted();
+        time_ns.extend(&rows.time_ns);
+        ordered &= time_ns[first.saturating_sub(1)..].is_sorted();
     }
     if !ordered {
         let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by(|&a, &b| f64::total_cmp(&time_s[a], &time_s[b]));
+        order.sort_by_key(|&row| time_ns[row]);
         values = order.iter().flat_map(|&row| values[row * width..(row + 1) * width].to_vec()).collect();
-        time_s = order.iter().map(|&row| time_s[row]).collect();
+        time_ns = order.iter().map(|&row| time_ns[row]).collect();
     }
-    SampleBlock { run, channels, time_s, values }
+    let time_s = time_ns.iter().map(|&ns| ns as f64 / 1e9).collect();
+    (time_ns, SampleBlock { run, channels, time_s, values })
 }

@@ -46,6 +46,9 @@ impl Sink for RunSink {
     }
 
     fn event(&mut self, event: &Event) {
-        drop(self.queue.try_send(Message::Event { event: event.clone(), wall: SystemTime::now() }));
+        let message = Message::Event { event: event.clone(), wall: SystemTime::now() };
+        if let Err(TrySendError::Full(_)) = self.queue.try_send(message) {
+            self.status.lost_events.fetch_add(1, Ordering::Relaxed);
+        }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Status {
     pub rows: AtomicU64,
     /// Rows it could not take.
     pub lost: AtomicU64,
+    /// Events and notes it could not take.
+    pub lost_events: AtomicU64,
     /// Bytes of the file that is written.
     pub bytes: AtomicU64,
     /// Bytes of the parts before it, as they were when they were full.

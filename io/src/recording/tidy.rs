@@ -6,6 +6,11 @@ use std::thread::JoinHandle;
 /// A file larger than this is not optimised: that takes it into memory as a whole.
 const OPTIMISE_BYTES: u64 = 64 * 1024 * 1024;
 
+/// Rows of a chunk: what a cut of the file, or a damaged place, costs at most.
+const MOST_ROWS: u64 = 1_000;
+/// By so much a file may grow when it gets its footer: a short one has little that could be made smaller.
+const FOOTER_BYTES: u64 = 64 * 1024;
+
 /// The file that is written while one is tidied up.
 pub(super) fn tidying_path(path: &Path) -> PathBuf {
     let mut beside = path.as_os_str().to_owned();
@@ -20,9 +25,13 @@ pub(super) fn tidy(path: &Path) {
         return;
     }
     let beside = tidying_path(path);
-    let profile = rerun::rrd::OptimizationProfile::OBJECT_STORE;
+    let profile = rerun::rrd::OptimizationProfile {
+        chunk_max_rows: MOST_ROWS,
+        chunk_max_rows_if_unsorted: MOST_ROWS,
+        ..rerun::rrd::OptimizationProfile::OBJECT_STORE
+    };
     let better = rerun::rrd::optimize_file(path, &beside, &profile).is_ok()
-        && (1..=size(path)).contains(&size(&beside));
+        && (1..=size(path) + FOOTER_BYTES).contains(&size(&beside));
     if !(better && std::fs::rename(&beside, path).is_ok()) {
         drop(std::fs::remove_file(&beside));
     }

@@ -50,6 +50,14 @@ pub enum RecordingTrouble {
         /// Rows since the last report.
         count: u64,
     },
+    /// The recorder could not keep up with what happened.
+    #[error(
+        "{count} events, commands or models are missing in the recording: the recorder could not keep up; a replay may show other settings than there were"
+    )]
+    EventsLost {
+        /// Events since the last report.
+        count: u64,
+    },
     /// The file cannot take what is recorded.
     #[error(
         "the recording {path} cannot be written: {reason}; what it holds so far stays readable, and recording goes on as soon as the file takes data again"
@@ -149,6 +157,26 @@ pub enum RecordingFlaw {
         /// How many.
         gaps: usize,
     },
+    /// Rows whose check sum differs.
+    #[error("{run}: rows from {} to {} s are not as they were written: the file was changed or damaged there; do not trust them", number(*.from_s), number(*.to_s))]
+    RowsAltered {
+        /// Name of the run.
+        run: String,
+        /// Time in seconds of the first row that may be wrong.
+        from_s: f64,
+        /// Time in seconds of the last one.
+        to_s: f64,
+    },
+    /// Texts whose check sum differs.
+    #[error(
+        "{run}: {texts} of its settings, commands, events and models are not as they were written: the file was changed or damaged; commands among them are not carried out"
+    )]
+    TextsAltered {
+        /// Name of the run.
+        run: String,
+        /// How many.
+        texts: usize,
+    },
 }
 
 impl Explain for RecordingFlaw {
@@ -157,6 +185,8 @@ impl Explain for RecordingFlaw {
             Self::Cut { .. } => "recording.cut",
             Self::Damaged { .. } => "recording.damaged",
             Self::Gap { .. } => "recording.gap",
+            Self::RowsAltered { .. } => "recording.rows_altered",
+            Self::TextsAltered { .. } => "recording.texts_altered",
         }
     }
 
@@ -172,6 +202,10 @@ impl Explain for RecordingFlaw {
                 ("missing_s", number(*missing_s)),
                 ("gaps", gaps.to_string()),
             ],
+            Self::RowsAltered { run, from_s, to_s } => {
+                vec![("run", run.clone()), ("from_s", number(*from_s)), ("to_s", number(*to_s))]
+            }
+            Self::TextsAltered { run, texts } => vec![("run", run.clone()), ("texts", texts.to_string())],
         }
     }
 }
@@ -181,10 +215,13 @@ impl RecordingFlaw {
     #[must_use]
     pub fn samples() -> Vec<Self> {
         let path = || "run.rrd".to_owned();
+        let run = || "run · stad · run 1".to_owned();
         vec![
             Self::Cut { path: path(), at: 12_000 },
             Self::Damaged { path: path(), at: 12_000, messages: 3 },
-            Self::Gap { run: "run · stad · run 1".to_owned(), from_s: 12.0, missing_s: 3.5, gaps: 2 },
+            Self::Gap { run: run(), from_s: 12.0, missing_s: 3.5, gaps: 2 },
+            Self::RowsAltered { run: run(), from_s: 30.0, to_s: 60.0 },
+            Self::TextsAltered { run: run(), texts: 1 },
         ]
     }
 }
@@ -230,6 +267,7 @@ impl Explain for RecordingTrouble {
     fn key(&self) -> &'static str {
         match self {
             Self::RowsLost { .. } => "recording.rows_lost",
+            Self::EventsLost { .. } => "recording.events_lost",
             Self::Write { .. } => "recording.write",
             Self::NoPart { .. } => "recording.no_part",
             Self::Removed { .. } => "recording.removed",
@@ -243,7 +281,9 @@ impl Explain for RecordingTrouble {
 
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
-            Self::RowsLost { count } | Self::ViewerBehind { count } => vec![("count", count.to_string())],
+            Self::RowsLost { count } | Self::EventsLost { count } | Self::ViewerBehind { count } => {
+                vec![("count", count.to_string())]
+            }
             Self::Write { path, reason } | Self::NoPart { path, reason } => {
                 vec![("path", path.clone()), ("reason", reason.clone())]
             }
@@ -264,6 +304,7 @@ impl RecordingTrouble {
         let text = |t: &str| t.to_owned();
         vec![
             Self::RowsLost { count: 120 },
+            Self::EventsLost { count: 3 },
             Self::Write { path: text("run.rrd"), reason: text("no space left on device") },
             Self::Removed { path: text("run.rrd") },
             Self::NoPart { path: text("run.rrd"), reason: text("permission denied") },

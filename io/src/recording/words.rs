@@ -26,7 +26,7 @@ pub fn line(kind: &EventKind) -> (&'static str, String) {
             Ending::Finished => (info, format!("{}: test finished", report.tag)),
             Ending::Stopped(reason) => (warning, format!("{}: test {reason}", report.tag)),
         },
-        EventKind::Recorded { words } => (info, words.clone()),
+        EventKind::Recorded { words, .. } => (info, words.clone()),
         EventKind::SamplesLost { count } => (warning, format!("{count} samples given up")),
         EventKind::EventsLost { count } => (warning, format!("{count} events given up")),
         EventKind::Stopped { reason } => (TextLogLevel::ERROR, format!("stopped by a defect: {reason}")),

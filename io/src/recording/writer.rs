@@ -17,6 +17,7 @@ use super::notes::{self, Note};
 use super::opening::blueprint_messages;
 use super::output::{Keep, Output};
 use super::run_sink::Message;
+use super::seal::{self, CHECKS, Sealing};
 use super::status::Status;
 use super::tanks::Tanks;
 use super::told::{self, told};
@@ -43,6 +44,7 @@ struct Run {
     tanks: Tanks,
     /// Batches without a frame of the drawing.
     still: usize,
+    sealing: Sealing,
 }
 
 pub(super) struct Writer {
@@ -59,6 +61,8 @@ pub(super) struct Writer {
     /// Time of the last row or event in seconds.
     now_s: f64,
     part_bytes: Option<u64>,
+    /// Messages that the file had not taken when it was last looked at.
+    unwritten: u64,
 }
 
 impl Writer {
@@ -70,8 +74,22 @@ impl Writer {
         part_bytes: Option<u64>,
     ) -> Self {
         let (time_s, wall_ns, values) = (vec![], vec![], vec![]);
-        let (run, events, notes, now_s) = (None, vec![], vec![], 0.0);
-        Self { queue, output, status, name, run, time_s, wall_ns, values, events, notes, now_s, part_bytes }
+        let (run, events, notes, now_s, unwritten) = (None, vec![], vec![], 0.0, 0);
+        Self {
+            queue,
+            output,
+            status,
+            name,
+            run,
+            time_s,
+            wall_ns,
+            values,
+            events,
+            notes,
+            now_s,
+            part_bytes,
+            unwritten,
+        }
     }
 
     /// Records until the sink is gone, or the handle closes.
@@ -97,6 +115,7 @@ impl Writer {
             }
         }
         self.flush();
+        self.seal();
         self.run = None;
         self.output.finish();
     }
@@ -105,6 +124,7 @@ impl Writer {
         match message {
             Message::Run(start) => {
                 self.flush();
+                self.seal();
                 self.output.keep(Keep::Open);
                 let begun = self.begin(&start);
                 self.output.keep(Keep::Write);
@@ -155,7 +175,8 @@ impl Writer {
         let column = |tank| channels.column(ChannelKind::Level(tank));
         let levels = (0..network.tanks.len()).filter_map(column).collect();
         stream.flush_with_timeout(BATCH)?;
-        self.run = Some(Run { stream, channels: channels.clone(), groups, levels, tanks, still: 0 });
+        let (channels, sealing) = (channels.clone(), Sealing::new());
+        self.run = Some(Run { stream, channels, groups, levels, tanks, still: 0, sealing });
         Ok(())
     }
 
@@ -165,9 +186,12 @@ impl Writer {
             let rows = Rows { time_s: &self.time_s, wall_ns: &self.wall_ns, values: &self.values };
             let logged = run.log_rows(&rows).and_then(|()| run.log_notes(&self.notes, self.now_s));
             let flushed = logged.and_then(|()| Ok(run.stream.flush_with_timeout(5 * BATCH)?));
-            let settings = self.events.iter().any(|(event, _)| matches!(event.kind, EventKind::Done(_)));
+            let of_event = |(event, _): &(Event, i64)| matches!(event.kind, EventKind::Done(_));
+            let models = self.notes.iter().any(|note| matches!(note, Note::Model(_)));
+            let settings = models || self.events.iter().any(of_event);
             self.output.keep(if settings { Keep::Settings } else { Keep::Write });
-            let logged = flushed.and_then(|()| run.log_events(&self.events));
+            let logged = flushed.and_then(|()| run.log_models(&self.notes, self.now_s));
+            let logged = logged.and_then(|()| run.log_events(&self.events));
             let flushed = logged.and_then(|()| Ok(run.stream.flush_with_timeout(5 * BATCH)?));
             self.output.keep(Keep::Write);
             if let Err(error) = flushed {
@@ -176,13 +200,36 @@ impl Writer {
             self.events.clear();
             self.notes.clear();
             self.output.check_there();
-            if let Some(most) = self.part_bytes {
-                self.output.rotate_over(most);
-            }
+            self.go_on();
         }
         self.time_s.clear();
         self.wall_ns.clear();
         self.values.clear();
+    }
+
+    /// Seals what is due, and goes on in another file when this one is full.
+    fn go_on(&mut self) {
+        let unwritten = self.status.unwritten.load(Ordering::Relaxed);
+        let Some(run) = &mut self.run else { return };
+        if unwritten != self.unwritten {
+            self.unwritten = unwritten;
+            run.sealing.restart();
+        }
+        let full = self.part_bytes.filter(|most| self.output.is_over(*most));
+        if full.is_some() || run.sealing.is_due() {
+            self.seal();
+        }
+        if full.is_some() {
+            self.output.rotate();
+        }
+    }
+
+    /// Logs the check sum of the rows since the last one.
+    fn seal(&mut self) {
+        let Some(run) = &mut self.run else { return };
+        if let Err(error) = run.log_check() {
+            self.report(&*error);
+        }
     }
 
     fn report(&self, error: &dyn std::error::Error) {
@@ -203,7 +250,11 @@ impl Run {
         }
         let width = self.channels.len();
         let count = rows.time_s.len();
-        let time = TimeColumn::new_duration_secs(TIME, rows.time_s.iter().copied());
+        let time_ns: Vec<i64> = rows.time_s.iter().map(|&t| run_nanoseconds(t)).collect();
+        for (&time_ns, row) in time_ns.iter().zip(rows.values.chunks(width)) {
+            self.sealing.add(time_ns, row);
+        }
+        let time = TimeColumn::new_duration_nanos(TIME, time_ns);
         let wall = TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, rows.wall_ns.iter().copied());
         let mut columns = Vec::new();
         for group in &self.groups {
@@ -268,7 +319,24 @@ impl Run {
         notes.iter().try_for_each(|note| notes::log(&self.stream, note, now_s))
     }
 
-    fn log_events(&self, events: &[(Event, i64)]) -> LogResult {
+    fn log_models(&self, notes: &[Note], now_s: f64) -> LogResult {
+        notes.iter().try_for_each(|note| match note {
+            Note::Model(model) => notes::log_model(&self.stream, model, now_s),
+            Note::Nyquist(_) => Ok(()),
+        })
+    }
+
+    fn log_check(&mut self) -> LogResult {
+        let Some(check) = self.sealing.take() else { return Ok(()) };
+        self.stream.set_time(TIME, rerun::TimeCell::from_duration_nanos(check.to_ns));
+        let text = seal::sealed(&toml::to_string(&check)?, &[]);
+        let rows = rerun::AnyValues::default().with_component::<rerun::components::Text>(seal::ROWS, [text]);
+        self.stream.log(CHECKS, &rows)?;
+        self.stream.reset_time();
+        Ok(self.stream.flush_with_timeout(5 * BATCH)?)
+    }
+
+    fn log_events(&mut self, events: &[(Event, i64)]) -> LogResult {
         if events.is_empty() {
             return Ok(());
         }
@@ -277,8 +345,12 @@ impl Run {
             TimeColumn::new_duration_secs(TIME, events.iter().map(|(e, _)| e.time_s)),
             TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, events.iter().map(|(_, w)| *w)),
         ];
+        let told: Vec<String> = events
+            .iter()
+            .zip(&texts)
+            .map(|((event, _), words)| told(&event.kind, self.sealing.number_event(), words))
+            .collect();
         let columns = TextLog::update_fields().with_many_text(texts).with_many_level(levels);
-        let told = events.iter().map(|(event, _)| told(&event.kind));
         let mut columns: Vec<_> = columns.columns_of_unit_batches()?.collect();
         for mut column in TextLog::update_fields().with_many_text(told).columns_of_unit_batches()? {
             let component = ComponentIdentifier::try_new(TOLD)?;
@@ -288,6 +360,11 @@ impl Run {
         }
         Ok(self.stream.send_columns(EVENTS, times, columns)?)
     }
+}
+
+/// Time of the run in nanoseconds.
+fn run_nanoseconds(time_s: f64) -> i64 {
+    (1e9 * time_s).round() as i64
 }
 
 fn nanoseconds(wall: SystemTime) -> i64 {
