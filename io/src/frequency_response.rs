@@ -93,7 +93,7 @@ impl Explain for FrequencyFileError {
 
 /// Reads a frequency response; points may come in any order.
 ///
-/// CSV with a header: `omega_rad_s` in rad/s or `f_hz` in Hz; `re` and `im`, or `gain` (PV units per MV unit) or `db`, and
+/// CSV with a header, decimals with a point, or with a comma where commas part no columns: `omega_rad_s` in rad/s or `f_hz` in Hz; `re` and `im`, or `gain` (PV units per MV unit) or `db`, and
 /// `phase_deg`. JSON: an array `frequencies` of objects with `omega_rad_s` (or `w_rad_s`), `re`, `im`, wherever it stands.
 ///
 /// # Errors
@@ -173,11 +173,12 @@ fn columns_of(path: &str, header: &csv::StringRecord) -> Result<Columns, Frequen
 }
 
 fn of_csv(path: &str, text: &str) -> Result<Vec<(f64, Complex64)>, FrequencyFileError> {
-    let first = text.lines().next().unwrap_or_default();
+    let first = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
     let separator = [b';', b'\t', b','].into_iter().find(|s| first.as_bytes().contains(s)).unwrap_or(b',');
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .flexible(true)
+        .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let refused = |e: csv::Error| FrequencyFileError::Read { path: path.to_owned(), reason: e.to_string() };
@@ -187,7 +188,8 @@ fn of_csv(path: &str, text: &str) -> Result<Vec<(f64, Complex64)>, FrequencyFile
         let row = row.map_err(refused)?;
         let number = |column: usize| {
             let text = row.get(column).unwrap_or_default();
-            text.parse::<f64>().map_err(|_| FrequencyFileError::Number {
+            let point = if separator == b',' { text.to_owned() } else { text.replace(',', ".") };
+            point.parse::<f64>().map_err(|_| FrequencyFileError::Number {
                 path: path.to_owned(),
                 line: k + 2,
                 text: text.to_owned(),
@@ -232,6 +234,7 @@ mod tests {
             (-0.6f64).atan2(0.5).to_degrees(),
         );
         let polar = read(&hertz).expect("points, in another order");
+        let comma = read(&format!("# of the bench\n{}", hertz.replace('.', ","))).expect("points");
         let json = read(
             r#"{"a": {"frequencies": [{"omega_rad_s": 0.1, "re": 1, "im": -0.5},
             {"omega_rad_s": 0.2, "re": 0.5, "im": -0.6}, {"omega_rad_s": 1, "re": 0.01, "im": -0.1}]}}"#,
@@ -240,6 +243,7 @@ mod tests {
         for omega in [0.05, 0.1, 0.15, 0.7] {
             let of = cartesian.at_omega(omega);
             assert!((of - polar.at_omega(omega)).norm() < 1e-12 * of.norm());
+            assert_eq!(comma.at_omega(omega), polar.at_omega(omega));
             assert!((of - json.at_omega(omega)).norm() < 1e-12 * of.norm());
         }
     }

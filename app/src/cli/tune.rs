@@ -39,10 +39,10 @@ pub struct Arguments {
     #[arg(long)]
     pub(super) controller: Option<String>,
     /// Closed-loop time constant (τc or λ) in seconds, for the rules that have one.
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", conflicts_with = "optimal", allow_hyphen_values = true)]
     tau_c: Option<f64>,
     /// Ku=..,Pu=.. from a test, for the rules that start from them.
-    #[arg(long, value_name = "Ku=..,Pu=..", allow_hyphen_values = true)]
+    #[arg(long, value_name = "Ku=..,Pu=..", conflicts_with = "optimal", allow_hyphen_values = true)]
     ultimate: Option<String>,
     /// What to make best: jv (least, the default), max-ki, iae-load, iae-setpoint.
     #[arg(long, value_name = "WHAT", requires = "optimal")]

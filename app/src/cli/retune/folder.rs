@@ -68,7 +68,7 @@ struct Line {
 
 pub(super) fn run(arguments: &Arguments, task: &Task) -> Result<Answer, Refusal> {
     let files = files(&arguments.log)?;
-    let reports = arguments.output.as_deref().filter(|o| !is_html(o));
+    let reports = arguments.output.as_deref().filter(|o| !output::is_html(o));
     if let Some(folder) = reports {
         std::fs::create_dir_all(folder)
             .map_err(|error| Refusal(format!("{} cannot be made: {error}", folder.display())))?;
@@ -88,10 +88,6 @@ pub(super) fn run(arguments: &Arguments, task: &Task) -> Result<Answer, Refusal>
 
 fn gain_of(line: &Line) -> f64 {
     line.gain_percent.unwrap_or(f64::NEG_INFINITY)
-}
-
-fn is_html(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html") || e.eq_ignore_ascii_case("htm"))
 }
 
 fn files(folder: &Path) -> Result<Vec<PathBuf>, Refusal> {
@@ -212,7 +208,7 @@ fn as_text(lines: &[Line]) -> String {
 fn write(arguments: &Arguments, files: &[PathBuf], lines: &[Line]) -> Result<(), Refusal> {
     let Some(path) = &arguments.output else { return Ok(()) };
     let safe = |path: &Path| files.iter().try_for_each(|log| output::check(path, log));
-    if is_html(path) {
+    if output::is_html(path) {
         safe(path)?;
         return output::write(path, &overview(arguments, lines, false).html());
     }

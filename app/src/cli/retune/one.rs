@@ -67,6 +67,7 @@ impl Outcome {
 pub(super) fn run(arguments: &Arguments, task: &Task) -> Result<Answer, Refusal> {
     if let Some(path) = &arguments.output {
         output::check(path, &arguments.log)?;
+        output::check_html(path)?;
     }
     let outcome = Outcome::of(&arguments.log, task)?;
     if let Some(path) = &arguments.output {

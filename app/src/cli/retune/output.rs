@@ -19,6 +19,18 @@ pub(super) fn check(output: &Path, log: &Path) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// Refuses a name that says something else than what is written.
+pub(super) fn check_html(output: &Path) -> Result<(), Refusal> {
+    if is_html(output) {
+        return Ok(());
+    }
+    Err(Refusal(format!("{}: the report is HTML, its name must end in .html", output.display())))
+}
+
+pub(super) fn is_html(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html") || e.eq_ignore_ascii_case("htm"))
+}
+
 pub(super) fn write(path: &Path, text: &str) -> Result<(), Refusal> {
     std::fs::write(path, text)
         .map_err(|error| Refusal(format!("{} cannot be written: {error}", path.display())))
