@@ -119,14 +119,20 @@ fn check(log: &ImportedLog) {
     }
 }
 
-/// Runs one input; panics with its number.
-fn run(case: usize, what: &str, input: &[u8], work: impl FnOnce() + std::panic::UnwindSafe) {
-    let begun = Instant::now();
-    let outcome = catch_unwind(work);
+/// Runs one input; panics with its number. A busy computer may hold one up: the shortest of three times counts.
+fn run(case: usize, what: &str, input: &[u8], work: impl Fn() + std::panic::RefUnwindSafe) {
     let shown = || String::from_utf8_lossy(input).into_owned();
-    assert!(outcome.is_ok(), "{what} {case} panicked:\n{}", shown());
-    let spent = begun.elapsed();
-    assert!(spent < LIMIT, "{what} {case} took {spent:?}:\n{}", shown());
+    let mut spent = Duration::MAX;
+    for _ in 0..3 {
+        let begun = Instant::now();
+        let outcome = catch_unwind(&work);
+        assert!(outcome.is_ok(), "{what} {case} panicked:\n{}", shown());
+        spent = spent.min(begun.elapsed());
+        if spent < LIMIT {
+            return;
+        }
+    }
+    panic!("{what} {case} took {spent:?}:\n{}", shown());
 }
 
 #[test]
