@@ -18,6 +18,17 @@ use crate::tune::Ultimate;
 /// Tunings compared at a time: more curves than these cannot be told apart.
 const MOST_COMPARED: usize = 4;
 
+/// A tuning with what goes along with it when a loop takes it over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Applied {
+    /// Gains and weights.
+    pub tuning: PidTuning,
+    /// Time constant of the PV filter in seconds.
+    pub pv_filter_s: f64,
+    /// Time constant of the filter on the setpoint in seconds.
+    pub setpoint_filter_s: f64,
+}
+
 /// A change of the document.
 #[derive(Debug, Clone)]
 pub enum DocumentCommand {
@@ -33,8 +44,8 @@ pub enum DocumentCommand {
     Tuning(String, PidTuning),
     /// PV filter of a loop in seconds.
     PvFilter(String, f64),
-    /// Tuning and PV filter of a loop together, as one step of the history.
-    ApplyTuning(String, PidTuning, f64),
+    /// Tuning, filter of the PV and filter of the setpoint of a loop together, as one step of the history.
+    ApplyTuning(String, Applied),
     /// Law of a loop with its settings.
     Law(String, Law),
     /// What stands around the law of a loop, all of it.
@@ -330,11 +341,14 @@ impl Document {
             DocumentCommand::PvFilter(tag, filter_s) => {
                 self.settings(tag)?.pv_filter_s = check_filter(*filter_s).map_err(CommandError::from)?;
             }
-            DocumentCommand::ApplyTuning(tag, tuning, filter_s) => {
+            DocumentCommand::ApplyTuning(tag, applied) => {
                 let usable = |e: GainsError| CommandError::from(e);
-                tuning.validated(&self.settings(tag)?.law).map_err(usable)?;
-                let filter_s = check_filter(*filter_s).map_err(usable)?;
-                self.set_loop(tag, |l| (l.tuning, l.pv_filter_s) = (*tuning, filter_s))?;
+                applied.tuning.validated(&self.settings(tag)?.law).map_err(usable)?;
+                let pv_filter_s = check_filter(applied.pv_filter_s).map_err(usable)?;
+                self.set_loop(tag, |l| {
+                    (l.tuning, l.pv_filter_s) = (applied.tuning, pv_filter_s);
+                    l.options.setpoint.filter_s = applied.setpoint_filter_s;
+                })?;
             }
             _ => {}
         }

@@ -10,7 +10,7 @@ mod error;
 mod history;
 mod sync;
 
-pub use command::{DocumentCommand, NewModel};
+pub use command::{Applied, DocumentCommand, NewModel};
 pub use data::{
     Candidate, Document, FittedRows, LogRoles, LoopSettings, ModelEntry, ModelOrigin, OptimumSettings,
     RigSettings, SourceChoice, Stretch,

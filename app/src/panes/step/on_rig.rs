@@ -3,12 +3,14 @@
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, Plot, PlotPoints};
 use vasos_engine::control::PidTuning;
+use vasos_engine::document::Applied;
+use vasos_engine::session::RigCommand;
 use vasos_engine::sim::{ScenarioError, Trial, TrialRun};
 
 use crate::action::Action;
 use crate::answers::{Question, Reply};
 use crate::panes::View;
-use crate::panes::tune::new_filter_s;
+use crate::panes::tune::applied;
 use crate::tuning::{PRESENT, Row, same_units};
 use crate::{i18n, plots, text, theme, tr};
 
@@ -64,11 +66,18 @@ fn question(view: &View, row: &Row) -> Option<Question> {
     let configuration = rig.network.spec.configurations.get(rig.configuration)?.id.clone();
     let tag = rig.active_loops().get(view.focus)?.id.clone();
     let settings = rig.loops.get(&tag)?;
-    let pv_filter_s = if row.rule == PRESENT {
-        settings.pv_filter_s
+    // What is in use is tried as it is, another row as the loop would take it over.
+    let (tuning, pv_filter_s, setpoint_filter_s) = if row.rule == PRESENT {
+        let tuning = PidTuning { gains: row.gains, ..settings.tuning };
+        (tuning, settings.pv_filter_s, settings.options.setpoint.filter_s)
     } else {
-        new_filter_s(view, row, &tag).unwrap_or(settings.pv_filter_s)
+        let Applied { tuning, pv_filter_s, setpoint_filter_s } = applied(view, row, &tag);
+        (tuning, pv_filter_s, setpoint_filter_s)
     };
+    let mut options = Box::new(settings.options.clone());
+    options.setpoint.filter_s = setpoint_filter_s;
+    let mut setup = rig.commands_after_load();
+    setup.push(RigCommand::Options { tag: tag.clone(), options });
     let slow_s = entry.model.transfer_function();
     // The largest coefficient of a first power of s is the sum of its time constants.
     let den = &slow_s.den;
@@ -76,10 +85,10 @@ fn question(view: &View, row: &Row) -> Option<Question> {
     let length_s = if constant_s.is_finite() && constant_s > 0.0 { LENGTH * constant_s } else { LENGTHS_S.1 };
     let trial = Trial {
         configuration,
-        setup: rig.commands_after_load(),
+        setup,
         measurement: rig.measurement,
         seed: rig.seed,
-        tuning: PidTuning { gains: row.gains, b: settings.tuning.b, c: settings.tuning.c },
+        tuning,
         pv_filter_s,
         level_cm: settings.setpoint_cm,
         step_cm: STEP_CM,

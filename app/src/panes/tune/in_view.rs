@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, RichText};
 use vasos_engine::control::PidTuning;
-use vasos_engine::document::{Candidate, DocumentCommand};
+use vasos_engine::document::{Applied, Candidate, DocumentCommand};
 use vasos_engine::tune::{detuned, find_rule};
 
 use super::{State, candidate, row_in_view, same, setpoint};
@@ -111,7 +111,7 @@ fn proof(row: &Row) -> Option<String> {
 ///
 /// Unfiltered derivative action keeps the pump at its limits with a rig's noise: with the paper's AMIGO tuning of
 /// STAD a filter of about Td (1 s) ends that.
-pub(in crate::panes) fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
+fn new_filter_s(view: &View, row: &Row, tag: &str) -> Option<f64> {
     let now_s = view.document.rig.loops.get(tag).map_or(0.0, |s| s.pv_filter_s);
     (row.gains.td_s > 0.0 && now_s == 0.0).then_some(row.gains.td_s)
 }
@@ -124,14 +124,25 @@ fn apply_words(view: &View, row: &Row, tag: &str) -> String {
     }
 }
 
-fn apply(view: &View, row: &Row, tag: String) -> Action {
-    let settings = view.document.rig.loops.get(&tag);
+/// What a loop takes over with a row: the weight and the filter of the setpoint that were chosen for an overshoot, else
+/// those it has.
+pub(in crate::panes) fn applied(view: &View, row: &Row, tag: &str) -> Applied {
+    let settings = view.document.rig.loops.get(tag);
     let (b, c) = settings.map_or((1.0, 0.0), |s| (s.tuning.b, s.tuning.c));
     let kept_s = settings.map_or(0.0, |s| s.pv_filter_s);
-    let filter_s = new_filter_s(view, row, &tag).unwrap_or(kept_s);
-    let b = view.tuning.setpoint.flatten().map_or(b, |side| side.b);
-    let tuning = PidTuning { gains: row.gains, b, c };
-    Action::Document(DocumentCommand::ApplyTuning(tag, tuning, filter_s))
+    let setpoint_s = settings.map_or(0.0, |s| s.options.setpoint.filter_s);
+    let side = view.tuning.setpoint.flatten();
+    let (b, c, setpoint_filter_s) = side.map_or((b, c, setpoint_s), |side| (side.b, 0.0, side.filter_s));
+    Applied {
+        tuning: PidTuning { gains: row.gains, b, c },
+        pv_filter_s: new_filter_s(view, row, tag).unwrap_or(kept_s),
+        setpoint_filter_s,
+    }
+}
+
+fn apply(view: &View, row: &Row, tag: String) -> Action {
+    let applied = applied(view, row, &tag);
+    Action::Document(DocumentCommand::ApplyTuning(tag, applied))
 }
 
 fn as_text(row: &Row) -> String {

@@ -16,7 +16,7 @@ use crate::tuning::{DETUNED, OPTIMAL, PRESENT, Refusal, Refused, Row, same_units
 use crate::widgets::segmented;
 use crate::{text, theme, tr};
 
-pub(super) use in_view::new_filter_s;
+pub(super) use in_view::applied;
 
 /// Width of a column of figures.
 const COLUMN: f32 = 35.0;
