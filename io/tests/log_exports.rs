@@ -436,3 +436,50 @@ fn remarks_of_several_lines_are_one_field() {
     assert!(log.table.time_s.iter().enumerate().all(|(k, t)| *t == k as f64));
     assert_eq!(log.table.lines[59_999], 60_001 + 59_999_u32.div_ceil(97));
 }
+
+/// Flux writes the bounds of its query, which are stamps too, ahead of the time of each value.
+#[test]
+fn influx_annotated() {
+    let mut text = "#group,false,false,true,true,false,false,true,true\n\
+        #datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339,double,string,string\n\
+        #default,mean,,,,,,,\n,result,table,_start,_stop,_time,_value,_field,_measurement\n"
+        .to_owned();
+    for (table, field) in ["FIC101.PV", "FIC101.OP"].into_iter().enumerate() {
+        for k in 0..40 {
+            let value = if table == 0 { pv(k) } else { mv(k) };
+            text += &format!(
+                ",,{table},2024-03-05T13:00:00Z,2024-03-05T16:00:00Z,2024-03-05T14:00:{k:02}Z,{value},{field},plant\n"
+            );
+        }
+    }
+    let log = import(&text);
+    assert_eq!((names(&log), log.table.len()), (vec!["FIC101.PV", "FIC101.OP"], 40));
+    starts(&log, "2024-03-05T14:00:00");
+    assert_eq!(column(&log, "FIC101.OP")[7], mv(7));
+}
+
+/// Times in milliseconds of which only a line above the rows tells the unit.
+#[test]
+fn twincat_scope() {
+    let head = "Name\tScope Project\nFile\tC:\\x.tcscopex\n\nName\tPV\tName\tMV\n\
+        SymbolName\tMAIN.fPV\tSymbolName\tMAIN.fMV\nSampleTime[ms]\t200\tSampleTime[ms]\t200\n\n";
+    let log = import(&rows(head, 50, |k| format!("{}\t{}\t{}\t{}", 200 * k, pv(k), 200 * k, mv(k))));
+    assert_eq!(log.report.time, TimeKind::Numbers { unit_s: 1e-3 });
+    assert!((log.table.time_s[49] - 9.8).abs() < 1e-12);
+    assert_eq!(column(&log, "MAIN.fMV")[3], mv(3));
+}
+
+/// Where the clock has AM and PM the month stands first, unless a date says otherwise; a remark here and there is no mode.
+#[test]
+fn a_clock_of_twelve_hours_goes_with_the_month_first() {
+    let row = |day: &str, k: usize| {
+        let note = if k == 0 { "B" } else { "" };
+        format!("{day} 2:{k:02}:00 PM,{},{},{note}", pv(k), mv(k))
+    };
+    let log = import(&rows("Timestamp,FIC101.PV,FIC101.OP,Marker\n", 50, |k| row("3/5/2024", k)));
+    starts(&log, "2024-03-05T14:00:00");
+    assert!(log.report.repairs.contains(&Repair::AmbiguousDates { month_first: true }));
+    assert_eq!(roles(&log)[3], None);
+    let log = import(&rows("Timestamp,FIC101.PV,FIC101.OP,Marker\n", 50, |k| row("25/3/2024", k)));
+    starts(&log, "2024-03-25T14:00:00");
+}

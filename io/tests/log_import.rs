@@ -157,7 +157,7 @@ fn reads_times_of_all_kinds() {
 #[test]
 fn says_when_day_and_month_may_be_swapped() {
     let ambiguous = log("time;pv\n", 10, |k| format!("05/06/2024 10:00:{k:02};{k}"));
-    assert!(import(&ambiguous).report.repairs.contains(&Repair::AmbiguousDates));
+    assert!(import(&ambiguous).report.repairs.contains(&Repair::AmbiguousDates { month_first: false }));
     let us = log("time;pv\n", 10, |k| format!("05/{}/2024 10:00:00;{k}", 10 + k));
     let log = import(&us);
     assert!(log.report.repairs.is_empty());

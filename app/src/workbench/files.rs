@@ -313,9 +313,19 @@ fn time_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> bool {
         if chosen != current {
             sheet.options.time_column = chosen;
         }
-        let doubtful = sheet.log.report.repairs.contains(&Repair::AmbiguousDates);
-        if doubtful && ui.button(tr!("import_sheet.month_first")).clicked() {
-            sheet.options.date_order = Some(DateOrder::MonthFirst);
+        let doubt = sheet.log.report.repairs.iter().find_map(|repair| match repair {
+            Repair::AmbiguousDates { month_first } => Some(*month_first),
+            _ => None,
+        });
+        let other = match doubt {
+            Some(false) => Some((tr!("import_sheet.month_first"), DateOrder::MonthFirst)),
+            Some(true) => Some((tr!("import_sheet.day_first"), DateOrder::DayFirst)),
+            None => None,
+        };
+        if let Some((words, order)) = other
+            && ui.button(words).clicked()
+        {
+            sheet.options.date_order = Some(order);
         }
     });
     sheet.options != before

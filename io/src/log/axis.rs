@@ -99,10 +99,21 @@ fn counted(read: &Read, options: &ImportOptions, repairs: &mut Vec<Repair>) -> A
     Axis { time_s, start: LogStart::Unknown, kind, columns: Vec::new(), zone_s: None, keep: None }
 }
 
+/// The column of stamps: of several one that moves, of those one that is named as a time, of those the first.
+pub(super) fn stamps(read: &Read) -> Option<usize> {
+    let of_kind = (0..read.columns.len()).filter(|&i| read.columns[i].kind == Kind::Full);
+    let rank = |&i: &usize| {
+        let column = &read.columns[i];
+        let moves = !stands_still(&column.values);
+        (moves, moves && is_time_name(&column.name), std::cmp::Reverse(i))
+    };
+    of_kind.max_by_key(rank)
+}
+
 /// The time column, or a date and a time of day: stamps, else by name, else by behaviour.
 fn choose(read: &Read) -> Vec<usize> {
     let of_kind = |kind| read.columns.iter().position(|c| c.kind == kind);
-    if let Some(full) = of_kind(Kind::Full) {
+    if let Some(full) = stamps(read) {
         return vec![full];
     }
     match (of_kind(Kind::Date), of_kind(Kind::Clock)) {
@@ -246,7 +257,8 @@ fn seconds(read: &mut Read, columns: &[usize]) -> (TimeKind, Vec<f64>) {
                 raw.iter_mut().for_each(|t| *t = from_digits(*t).unwrap_or(f64::NAN));
                 return (TimeKind::Stamps, raw);
             }
-            let (kind, unit_s, origin) = numeric_kind(&raw, &unit_of(read, columns[0]));
+            let stated_s = read.stated_sample_time_s;
+            let (kind, unit_s, origin) = numeric_kind(&raw, &unit_of(read, columns[0]), stated_s);
             raw.iter_mut().for_each(|t| *t = (*t - origin) * unit_s);
             (kind, raw)
         }
@@ -283,7 +295,7 @@ fn unit_of(read: &Read, column: usize) -> String {
 }
 
 /// Kind, seconds of a unit, and what to take off first.
-fn numeric_kind(raw: &[f64], name: &str) -> (TimeKind, f64, f64) {
+fn numeric_kind(raw: &[f64], name: &str, stated_s: Option<f64>) -> (TimeKind, f64, f64) {
     let first = raw.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     let mut sizes: Vec<f64> = steps(raw).map(f64::abs).filter(|s| *s > 0.0).take(1000).collect();
     sizes.sort_by(f64::total_cmp);
@@ -312,7 +324,9 @@ fn numeric_kind(raw: &[f64], name: &str) -> (TimeKind, f64, f64) {
     } else if has("h") || has("hours") || has("horas") {
         3600.0
     } else {
-        1.0
+        // A step that is the sample time above the rows in another unit tells that unit.
+        let is_it = |unit_s: &f64| stated_s.is_some_and(|h| (step * unit_s / h - 1.0).abs() < 0.01);
+        [1.0, 1e-3, 60.0, 3600.0].into_iter().find(is_it).unwrap_or(1.0)
     };
     (TimeKind::Numbers { unit_s }, unit_s, 0.0)
 }

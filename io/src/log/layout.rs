@@ -226,17 +226,24 @@ fn numbered_header(lines: &[&str], rows: &[usize], layout: &Layout) -> bool {
         && counts_up
 }
 
-/// The sample time a recorder writes above rows without a time: `Delta_X 0.1`, `Sample time [s]: 0.2`.
+/// The sample time in seconds that a recorder writes above its rows: `Delta_X 0.1`, `Sample time [s]: 0.2`,
+/// `SampleTime[ms] 200`.
 fn stated_sample_time(above: &[&str], decimal: Decimal) -> Option<f64> {
-    const NAMES: [&str; 6] = ["delta_x", "sample time", "sampling time", "abtastzeit", "dt", "ts"];
+    const NAMES: [&str; 7] =
+        ["delta_x", "sample time", "sampletime", "sampling time", "abtastzeit", "dt", "ts"];
     above.iter().find_map(|line| {
         let lower = line.trim_start_matches(['#', '%', ' ', '"']).to_lowercase();
         let rest = NAMES.iter().find_map(|name| lower.strip_prefix(name))?;
         let stands_alone = rest.starts_with([' ', '\t', ':', '=', ';', ',', '[', '(']);
-        let seconds = !rest.contains("ms") && !rest.contains("min");
+        let says = |unit: &str| rest.split(|c: char| !c.is_alphabetic()).any(|word| word == unit);
+        let unit_s = match () {
+            () if says("ms") => 1e-3,
+            () if says("min") => 60.0,
+            () => 1.0,
+        };
         let mut words = rest.split([' ', '\t', ':', '=', ';']).filter(|w| !w.is_empty());
         let value = words.find_map(|word| number::parse(word, decimal))?;
-        (stands_alone && seconds && value > 0.0).then_some(value)
+        (stands_alone && value > 0.0).then_some(value * unit_s)
     })
 }
 
@@ -262,6 +269,8 @@ struct Dates {
     day_first: bool,
     month_first: bool,
     any: bool,
+    /// A clock with AM and PM, as where the month stands first.
+    twelve_hours: bool,
     /// Earliest and latest by either order, in seconds.
     ends_s: [Option<[f64; 2]>; 2],
 }
@@ -280,6 +289,8 @@ impl Dates {
             let [from, to] = self.ends_s[k].unwrap_or([s, s]);
             self.ends_s[k] = Some([from.min(s), to.max(s)]);
             self.any = true;
+            let lower = field.to_ascii_lowercase();
+            self.twelve_hours |= field.contains('/') && (lower.ends_with("am") || lower.ends_with("pm"));
             self.day_first |= order_of(field) == Some(DateOrder::DayFirst);
             self.month_first |= order_of(field) == Some(DateOrder::MonthFirst);
         }
@@ -292,6 +303,7 @@ impl Dates {
             (true, _) => (DateOrder::DayFirst, false),
             (false, true) => (DateOrder::MonthFirst, false),
             _ if length(0) > TORN * length(1) => (DateOrder::MonthFirst, false),
+            _ if self.twelve_hours => (DateOrder::MonthFirst, true),
             _ => (DateOrder::DayFirst, self.any && length(1) <= TORN * length(0)),
         }
     }

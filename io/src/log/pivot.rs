@@ -174,7 +174,7 @@ fn time_columns(read: &Read, options: &ImportOptions) -> Option<Vec<usize>> {
         return read.columns.iter().position(|c| c.name == *name).map(|i| vec![i]);
     }
     let of = |kind| read.columns.iter().position(|c| c.kind == kind);
-    if let Some(full) = of(Kind::Full) {
+    if let Some(full) = super::axis::stamps(read) {
         return Some(vec![full]);
     }
     if let (Some(date), Some(clock)) = (of(Kind::Date), of(Kind::Clock)) {

@@ -238,7 +238,10 @@ pub enum Repair {
         step_s: f64,
     },
     /// Dates that read as day/month and as month/day.
-    AmbiguousDates,
+    AmbiguousDates {
+        /// Month/day was taken: the clock has AM and PM.
+        month_first: bool,
+    },
     /// No time in the file.
     NoTimeColumn {
         /// Sample time taken, in seconds.
@@ -371,9 +374,13 @@ impl std::fmt::Display for Repair {
             Self::Appended { file, step_s } => {
                 write!(f, "{file} has no dates: it was put {} s behind the last row before", number(*step_s))
             }
-            Self::AmbiguousDates => {
+            Self::AmbiguousDates { month_first: false } => {
                 write!(f, "the dates read as day/month and as month/day: day/month was taken")
             }
+            Self::AmbiguousDates { month_first: true } => write!(
+                f,
+                "the dates read as day/month and as month/day: month/day was taken, as their clock has AM and PM"
+            ),
             Self::NoTimeColumn { sample_time_s } => write!(
                 f,
                 "the file has no time column: rows were taken to be {} s apart; give the sample time",
@@ -416,7 +423,8 @@ impl Explain for Repair {
             Self::FileMerged { .. } => "repair.file_merged",
             Self::Overlap { .. } => "repair.overlap",
             Self::Appended { .. } => "repair.appended",
-            Self::AmbiguousDates => "repair.ambiguous_dates",
+            Self::AmbiguousDates { month_first: false } => "repair.ambiguous_dates",
+            Self::AmbiguousDates { month_first: true } => "repair.ambiguous_dates_month_first",
             Self::NoTimeColumn { .. } => "repair.no_time_column",
         }
     }
@@ -498,7 +506,7 @@ impl Explain for Repair {
                 vec![("file", file.clone()), ("count", count.to_string()), ("length_s", number(*length_s))]
             }
             Self::Appended { file, step_s } => vec![("file", file.clone()), ("step_s", number(*step_s))],
-            Self::AmbiguousDates => Vec::new(),
+            Self::AmbiguousDates { .. } => Vec::new(),
             Self::NoTimeColumn { sample_time_s } => vec![("sample_time_s", number(*sample_time_s))],
         }
     }
@@ -520,7 +528,8 @@ impl Repair {
             Self::StrayStamps { count: 1, line: 68 },
             Self::TimeRestart { line: 74, back_s: 23.7, from_line: 75, to_line: 300 },
             Self::Gaps { count: 8, line: 91, longest_s: 120.0 },
-            Self::AmbiguousDates,
+            Self::AmbiguousDates { month_first: false },
+            Self::AmbiguousDates { month_first: true },
             Self::NoTimeColumn { sample_time_s: 1.0 },
         ]
         .into_iter()

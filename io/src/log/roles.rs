@@ -39,8 +39,11 @@ pub(super) fn propose(table: &LogTable) -> Roles {
     let mut sp = best_named(&hints, Role::Sp, &taken, |i| (true, kin(i)));
     taken.extend(sp);
     let not_words: Vec<usize> = taken.iter().copied().filter(|i| !words.contains(i)).collect();
-    let mode =
-        best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| words.first().copied());
+    let mode = best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| {
+        // A remark here and there is no mode.
+        let filled = |i: &usize| columns[*i].values.iter().filter(|v| v.is_finite()).count();
+        words.iter().copied().find(|i| 2 * filled(i) >= table.len())
+    });
     taken.extend(mode);
     // A likely name on a column that never moves gives way to one that does.
     let named_mv = mv;

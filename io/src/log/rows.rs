@@ -317,7 +317,8 @@ impl<'a> Reader<'a> {
         }
         let order_told = self.stamps.iter().any(|s| s.day_first || s.month_first);
         if self.layout.ambiguous_dates && !order_told {
-            repairs.push(Repair::AmbiguousDates);
+            let month_first = self.layout.date_order == DateOrder::MonthFirst;
+            repairs.push(Repair::AmbiguousDates { month_first });
         }
         Read {
             columns: self.columns,
