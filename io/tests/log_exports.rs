@@ -483,3 +483,26 @@ fn a_clock_of_twelve_hours_goes_with_the_month_first() {
     let log = import(&rows("Timestamp,FIC101.PV,FIC101.OP,Marker\n", 50, |k| row("25/3/2024", k)));
     starts(&log, "2024-03-25T14:00:00");
 }
+
+/// Times of day with points, or with letters, between; units with digits in them behind grouped numbers.
+#[test]
+fn times_and_numbers_of_other_countries() {
+    let clock = |k: usize, parts: [&str; 3]| {
+        let s = 23 * 3600 + 59 * 60 + k;
+        format!("{:02}{}{:02}{}{:02}{}", s / 3600 % 24, parts[0], s / 60 % 60, parts[1], s % 60, parts[2])
+    };
+    let day = |k: usize| if k < 60 { "05.03.24" } else { "06.03.24" };
+    let dotted = |k: usize| format!("{};{};{};{}", day(k), clock(k, [".", ".", ""]), pv(k), mv(k));
+    let log = import(&rows("Date;Time;PV;MV\n", 700, dotted));
+    assert!((log.table.time_s[699] - 699.0).abs() < 1e-6, "{:?}", log.report.repairs);
+    starts(&log, "2024-03-05T23:59:00");
+    let spelled = |k: usize| format!("{};{};{}", clock(k, ["h", "m", "s"]), pv(k), mv(k));
+    let log = import(&rows("Hora;PV;MV\n", 100, spelled));
+    assert!((log.table.time_s[99] - 99.0).abs() < 1e-6, "{:?}", log.report.repairs);
+    let grouped = |k: usize| format!("{k},\"1,{:.1} m3/h\",{:.1} %", 200.0 + pv(k), mv(k));
+    let text = rows("Time,Flow,Valve\n", 50, grouped) + "Average,\"1,250.0 m3/h\",42 %\n";
+    let log = import(&text);
+    assert!((column(&log, "Flow")[3] - (1200.0 + pv(3))).abs() < 0.06, "{:?}", log.report.repairs);
+    assert_eq!(log.table.column("Flow").and_then(|c| c.unit.as_deref()), Some("m3/h"));
+    assert_eq!(log.table.len(), 50);
+}

@@ -41,6 +41,11 @@ fn kind(field: &str, layout: &Layout) -> Kind {
 /// A column with any fair share of numbers is one of numbers; its words ("Bad") are missing values.
 fn judge(counts: [usize; 5]) -> Kind {
     let total: usize = counts.iter().sum();
+    // Of times of day with points between some read as dates as well: 10.11.12.
+    let (dates, clocks) = (counts[Kind::Date as usize], counts[Kind::Clock as usize]);
+    if 5 * clocks >= dates && 2 * (dates + clocks) > total && clocks > 0 {
+        return Kind::Clock;
+    }
     let order = [Kind::Full, Kind::Date, Kind::Clock];
     let most = order.into_iter().max_by_key(|k| counts[*k as usize]).unwrap_or(Kind::Full);
     if counts[Kind::Number as usize] * 5 >= total {

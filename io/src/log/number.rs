@@ -31,8 +31,15 @@ pub(super) fn parse(field: &str, decimal: Decimal) -> Option<f64> {
 
 /// A number with a unit behind it, as in `23.5 °C` or `40%`: both.
 pub(super) fn parse_quantity(field: &str, decimal: Decimal) -> Option<(f64, &str)> {
-    let end = field.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let (value, unit) = (parse(&field[..end], decimal)?, field[end..].trim());
+    let starts_unit = |(at, c): (usize, char)| {
+        let is_exponent = || {
+            let rest = || field[at + 1..].trim_start_matches(['+', '-']);
+            matches!(c, 'e' | 'E') && rest().starts_with(|c: char| c.is_ascii_digit())
+        };
+        (c.is_alphabetic() || matches!(c, '%' | '°')) && !is_exponent()
+    };
+    let (end, _) = field.char_indices().find(|c| starts_unit(*c))?;
+    let (value, unit) = (parse(field[..end].trim_end(), decimal)?, field[end..].trim());
     is_unit(unit).then_some((value, unit))
 }
 

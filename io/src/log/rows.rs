@@ -122,7 +122,7 @@ impl<'a> Reader<'a> {
             layout,
             charset: sample.charset,
             columns: columns.collect(),
-            stamps: vec![StampReader::new(layout.date_order); kinds.len()],
+            stamps: kinds.iter().map(|k| StampReader::new(layout.date_order, *k == Kind::Clock)).collect(),
             suffixes: vec![None; kinds.len()],
             missing: vec![Missing::default(); kinds.len()],
             lines: Vec::with_capacity(rows),

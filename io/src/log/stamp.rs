@@ -65,7 +65,9 @@ pub(super) fn parse(field: &str, order: DateOrder) -> Option<Stamp> {
     // Most fields are plain numbers: a look at their marks saves trying every form.
     let marks =
         field.bytes().filter(|b| matches!(b, b':' | b'/' | b'-' | b' ' | b'T' | b'_' | 0x80..)).count();
-    if marks == 0 && field.bytes().filter(|b| *b == b'.').count() < 2 {
+    let is_spelled_clock =
+        || field.contains(['h', 'H']) && field.ends_with(|c: char| c.is_ascii_digit() || c == 's');
+    if marks == 0 && field.bytes().filter(|b| *b == b'.').count() < 2 && !is_spelled_clock() {
         return if field.len() >= 8 { compact(field) } else { None };
     }
     if field.contains('年') {
@@ -93,7 +95,7 @@ pub(super) fn parse(field: &str, order: DateOrder) -> Option<Stamp> {
     match day(date, order) {
         Some(midnight) if clock.is_empty() => Some(Stamp::Date(midnight)),
         Some(midnight) => full(midnight, clock),
-        None => match clock_s(field) {
+        None => match clock_s(field).or_else(|| dotted_clock_s(field).map(|s| (s, None))) {
             Some((seconds, None)) => Some(Stamp::Clock(seconds)),
             Some(_) => None,
             None => match blanks() {
@@ -201,9 +203,21 @@ fn compact(field: &str) -> Option<Stamp> {
     sane.then(|| Stamp::Full { time_s: midnight + (h * 3600 + m * 60 + s) as f64 + decimals, zone_s })
 }
 
+/// Seconds of a time of day with points between, as in Finland and Italy: `23.59.00`. Some read as dates, too.
+fn dotted_clock_s(text: &str) -> Option<f64> {
+    let parts: Vec<&str> = text.split('.').collect();
+    let is_two_digits = |part: &&str| part.len() == 2 && part.bytes().all(|b| b.is_ascii_digit());
+    let is_clock = parts.len() == 3 && parts[1..].iter().all(is_two_digits) && parts[0].len() <= 2;
+    is_clock.then(|| clock_s(&parts.join(":")))?.map(|(seconds, _)| seconds)
+}
+
 /// Seconds of a time of day, and the seconds its zone is ahead of UTC.
 fn clock_s(text: &str) -> Option<(f64, Option<f64>)> {
-    let lower = text.trim().to_ascii_lowercase();
+    let mut lower = text.trim().to_ascii_lowercase();
+    // 14h05, 14h05m30s
+    if !lower.contains(':') && lower.split('h').next().is_some_and(|h| whole(h).is_some()) {
+        lower = lower.replace(['h', 'm'], ":").trim_end_matches(['s', ':']).to_owned();
+    }
     let (clock, zone) = split_zone(&lower)?;
     let (clock, afternoon) = ["pm", "p.m."]
         .iter()
@@ -282,6 +296,7 @@ fn offset_s(text: &str) -> Option<f64> {
 #[derive(Debug, Clone)]
 pub(super) struct StampReader {
     order: DateOrder,
+    clock: bool,
     day: [u8; 11],
     midnight_s: f64,
     /// Orders of day and month that dates so far could only be read in.
@@ -290,8 +305,9 @@ pub(super) struct StampReader {
 }
 
 impl StampReader {
-    pub fn new(order: DateOrder) -> Self {
-        Self { order, day: [0; 11], midnight_s: 0.0, day_first: false, month_first: false }
+    /// A reader of stamps, or of times of day alone.
+    pub fn new(order: DateOrder, clock: bool) -> Self {
+        Self { order, clock, day: [0; 11], midnight_s: 0.0, day_first: false, month_first: false }
     }
 
     /// A field that has been trimmed.
@@ -300,6 +316,9 @@ impl StampReader {
             return Some(stamp);
         }
         let text = std::str::from_utf8(field).ok()?;
+        if self.clock {
+            return dotted_clock_s(text).or_else(|| clock_s(text).map(|(s, _)| s)).map(Stamp::Clock);
+        }
         let stamp = parse(text, self.order);
         if !matches!(stamp, Some(Stamp::Clock(_))) && text.contains(['/', '-', '.']) {
             let order = order_of(text);
