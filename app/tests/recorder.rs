@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use skip::skip;
-use vasos_engine::session::RecordedRun;
-use vasos_io::recording::{Parts, read_runs};
+use vasos_engine::session::{Event, RecordedRun};
+use vasos_io::recording::{Parts, event_words, read_runs};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_vasos");
 
@@ -157,6 +157,9 @@ fn a_disk_that_fills_and_is_freed_again_costs_what_did_not_fit() {
     let run = &runs(&out)[0];
     let gaps: Vec<f64> = run.rows.time_s.windows(2).map(|t| t[1] - t[0]).filter(|gap| *gap > 0.3).collect();
     assert_eq!(gaps.len(), 1, "one gap while it was full: {gaps:?}; {words}");
+    let told = |event: &&Event| event_words(&event.kind).1.contains("batches before this are missing");
+    let told: Vec<f64> = run.events.iter().filter(told).map(|event| event.time_s).collect();
+    assert_eq!(told.len(), 1, "the file says it as well: {told:?}");
     println!("{} rows, a gap of {} s at 100 ×; {words}", run.len(), gaps[0]);
 }
 

@@ -28,6 +28,8 @@ pub(super) struct Status {
     pub behind: AtomicU64,
     /// Messages that the file did not take.
     pub unwritten: AtomicU64,
+    /// Batches that are missing in front of one that was written again, until the recorder has told the file.
+    pub missing_before: AtomicU64,
     /// The handle wants the recorder to end.
     pub closing: AtomicBool,
     writing_fails: AtomicBool,
@@ -59,6 +61,7 @@ impl Status {
     }
 
     pub fn report_resumed(&self, count: u64) {
+        self.missing_before.fetch_add(count, Ordering::Relaxed);
         self.writing_fails.store(false, Ordering::Relaxed);
         self.report(RecordingTrouble::Resumed { path: self.path.clone(), count });
     }

@@ -37,6 +37,8 @@ type LogResult = Result<(), Box<dyn std::error::Error>>;
 
 /// What one run needs.
 struct Run {
+    /// Number in the session.
+    number: u64,
     stream: RecordingStream,
     channels: Arc<ChannelSet>,
     groups: Vec<Group>,
@@ -176,7 +178,8 @@ impl Writer {
         let levels = (0..network.tanks.len()).filter_map(column).collect();
         stream.flush_with_timeout(BATCH)?;
         let (channels, sealing) = (channels.clone(), Sealing::new());
-        self.run = Some(Run { stream, channels, groups, levels, tanks, still: 0, sealing });
+        let number = *number;
+        self.run = Some(Run { number, stream, channels, groups, levels, tanks, still: 0, sealing });
         Ok(())
     }
 
@@ -210,7 +213,14 @@ impl Writer {
     /// Seals what is due, and goes on in another file when this one is full.
     fn go_on(&mut self) {
         let unwritten = self.status.unwritten.load(Ordering::Relaxed);
+        let missing = self.status.missing_before.swap(0, Ordering::Relaxed);
         let Some(run) = &mut self.run else { return };
+        if missing > 0 {
+            let words = format!("{missing} batches before this are missing: the disk did not take them");
+            let kind = EventKind::Recorded { words, test_over: None };
+            let event = Event { run: run.number, time_s: self.now_s, kind };
+            self.events.push((event, nanoseconds(SystemTime::now())));
+        }
         if unwritten != self.unwritten {
             self.unwritten = unwritten;
             run.sealing.restart();
