@@ -144,19 +144,26 @@ fn a_disk_that_fills_and_is_freed_again_costs_what_did_not_fit() {
     let folder = folder();
     let (mount, out) = (folder.path().join("disk"), folder.path().join("run.rrd"));
     std::fs::create_dir(&mount).expect("made");
+    // A command comes while the disk is full.
+    let scenario = folder.path().join("story.toml");
+    let text = "schema = 1\nrig = \"stad\"\nduration_s = 1e6\n\
+        [[event]]\nat_s = 300.0\nsetpoint = { tag = \"LIC-02\", level_cm = 18.0 }\n";
+    std::fs::write(&scenario, text).expect("written");
     // The disk has 400 kB, 250 of them taken until four seconds have gone by.
     let script = "unshare -rm bash -c '
         mount -t tmpfs -o size=400k tmpfs $DISK
         head -c 250000 /dev/zero >$DISK/ballast
-        $VASOS record stad -o $DISK/run.rrd --speed 100 --no-viewer &
+        $VASOS record $STORY -o $DISK/run.rrd --speed 100 --no-viewer &
         sleep 4; rm $DISK/ballast; sleep 3; kill -INT $!; wait $!; status=$?
         cp $DISK/run.rrd $OUT; exit $status'";
-    let output = shell(script, &[("DISK", &mount), ("OUT", &out)]);
+    let output = shell(script, &[("DISK", &mount), ("OUT", &out), ("STORY", &scenario)]);
     let words = said(&output);
     assert!(words.contains("cannot be written") && words.contains("is written again"), "{words}");
     let run = &runs(&out)[0];
     let gaps: Vec<f64> = run.rows.time_s.windows(2).map(|t| t[1] - t[0]).filter(|gap| *gap > 0.3).collect();
     assert_eq!(gaps.len(), 1, "one gap while it was full: {gaps:?}; {words}");
+    let moved = |event: &&Event| event_words(&event.kind).1 == "LIC-02: setpoint 18 cm";
+    assert_eq!(run.events.iter().find(moved).map(|event| event.time_s), Some(300.0), "no command is lost");
     let told = |event: &&Event| event_words(&event.kind).1.contains("batches before this are missing");
     let told: Vec<f64> = run.events.iter().filter(told).map(|event| event.time_s).collect();
     assert_eq!(told.len(), 1, "the file says it as well: {told:?}");

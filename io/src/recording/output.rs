@@ -144,7 +144,7 @@ impl LogSink for Output {
     fn send(&self, message: LogMsg) {
         let mut disk = self.disk();
         disk.remember(&message);
-        match disk.append(&message) {
+        match disk.append_or_owe(&message) {
             Ok(missing) => {
                 self.status.bytes.store(disk.good_bytes, Ordering::Relaxed);
                 if missing > 0 {
@@ -181,6 +181,8 @@ struct Disk {
     missing: u64,
     keep: Keep,
     opening: Vec<LogMsg>,
+    /// Messages with settings that the file has not taken: they are written as soon as it does.
+    owed: Vec<LogMsg>,
 }
 
 impl Disk {
@@ -218,6 +220,7 @@ impl Disk {
             missing: 0,
             keep,
             opening,
+            owed: vec![],
         };
         disk.good_bytes = disk.file.stream_position().unwrap_or_default();
         Ok(disk)
@@ -273,6 +276,23 @@ impl Disk {
         if self.keep != Keep::Write && self.opening.len() < MOST_KEPT {
             self.opening.push(message.clone());
         }
+    }
+
+    /// As [`Self::append`], and with it the settings that the file did not take before.
+    fn append_or_owe(&mut self, message: &LogMsg) -> Result<u64, String> {
+        let written = self.append(message);
+        if written.is_err() && self.keep == Keep::Settings && self.owed.len() < MOST_KEPT {
+            self.owed.push(message.clone());
+        }
+        if written.is_ok() {
+            while let Some(owed) = self.owed.pop() {
+                if self.append(&owed).is_err() {
+                    self.owed.push(owed);
+                    break;
+                }
+            }
+        }
+        written
     }
 
     /// Writes a message whole or not at all; gives how many were missed before it.
