@@ -27,7 +27,7 @@ use super::words;
 /// Wall time between two batches.
 const BATCH: Duration = Duration::from_millis(950);
 /// Rows that make a batch before its time.
-const MOST_ROWS: usize = 10_000;
+const MOST_ROWS: usize = 2_000;
 /// Frames of the drawing in a batch.
 const MOST_FRAMES: usize = 5;
 /// How long a closing recorder waits for its sink to be let go.
