@@ -10,9 +10,11 @@ use super::metrics::Excitation;
 use super::stability::{gain_crossings, is_stable, typical_omega};
 use crate::model::realization::Hermite;
 
-/// Phase per step of the fastest pole of the process and of the last unit crossing, in radians.
-const POLE_STEP_RAD: f64 = 0.5;
+/// Phase per step of the fastest pole of the process and of the last unit crossing, in radians; without dead time no step
+/// need be shorter than those of a response.
+const POLE_STEP_RAD: f64 = 0.3;
 const CROSSING_STEP_RAD: f64 = 0.08;
+const LEAST_CROSSING_STEP_RAD: f64 = 0.02;
 /// Steps in one dead time at least …
 const STEPS_PER_DEAD_TIME: f64 = 3.0;
 /// … unless the dead time is so short that y moves less than this in it, as a phase in radians.
@@ -50,16 +52,18 @@ pub(crate) fn quick_iae(open: &OpenLoop, excitation: Excitation) -> Option<f64> 
     let first_crossing = crossings.first().map_or(last_crossing, |c| c.omega);
     let quiet_s = QUIET_RAD / first_crossing + QUIET_DEAD_TIMES * open.dead_time_s;
     let course = Course { goal: inputs.r, whole, dead_time_s: open.dead_time_s, quiet_s };
+    let moduli = || open.poles.iter().map(|p| p.norm());
+    let of_poles_s = POLE_STEP_RAD / moduli().fold(0.0, f64::max);
     if open.dead_time_s > 0.0 {
-        let moduli = || open.poles.iter().map(|p| p.norm());
         let moving = moduli().filter(|m| *m > 0.0).fold(f64::INFINITY, f64::min);
         let moving = if moving.is_finite() { moving.max(last_crossing) } else { last_crossing };
         let h = (CROSSING_STEP_RAD / last_crossing)
-            .min(POLE_STEP_RAD / moduli().fold(0.0, f64::max))
+            .min(of_poles_s)
             .min((open.dead_time_s / STEPS_PER_DEAD_TIME).max(UNSEEN_PHASE_RAD / moving));
         return course.iae(Stepper::new(open, inputs, h), MOST_STEPS);
     }
-    let mut h = CROSSING_STEP_RAD / last_crossing;
+    let mut h =
+        (CROSSING_STEP_RAD / last_crossing).min(of_poles_s.max(LEAST_CROSSING_STEP_RAD / last_crossing));
     while h * last_crossing < f64::from(u16::MAX) {
         let found = course.iae(Stepper::new(open, inputs, h), STEPS_BEFORE_COARSER);
         if found.is_some() {

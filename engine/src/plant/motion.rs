@@ -412,10 +412,10 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
         // A plain loop: a closure of this size is called instead of taken into the loop.
         let mut volume = [V::of(0.0); S];
-        for i in 0..self.streams.slots() {
+        for (i, volume) in volume.iter_mut().enumerate().take(self.streams.slots()) {
             let flows = self.start_flow[i] * w.start + self.end_flow[i] * w.end;
             let bends = self.start_bend[i] * w.start_bend + self.end_bend[i] * w.end_bend;
-            volume[i] = self.volume[i] * w.rise + (flows + bends);
+            *volume = self.volume[i] * w.rise + (flows + bends);
         }
         self.count(volume, self.passed_s);
         for i in 0..N {
