@@ -44,8 +44,19 @@ impl Stepper {
 
     pub(super) fn step(&mut self) -> (f64, f64) {
         match self {
-            Self::Delayed(l) => l.step(),
+            Self::Delayed(l) => {
+                let (y, u) = l.step();
+                (y.start, u)
+            }
             Self::Direct(l) => l.step(),
+        }
+    }
+
+    /// As [`Self::step`]: y over the step.
+    pub(super) fn arc(&mut self) -> Hermite {
+        match self {
+            Self::Delayed(l) => l.step().0,
+            Self::Direct(l) => l.arc(),
         }
     }
 }
@@ -127,7 +138,8 @@ impl Delayed {
         self.h * self.on_the_way.len() as f64
     }
 
-    fn step(&mut self) -> (f64, f64) {
+    /// y over the step, and u where it starts.
+    fn step(&mut self) -> (Hermite, f64) {
         let v = self.on_the_way[self.oldest];
         let output = |x: &DVector<f64>, value: f64, slope: f64, of: &Realization| {
             (of.output(x, value), of.output_slope(x, value, slope))
@@ -142,7 +154,7 @@ impl Delayed {
         let u = Hermite { start: u_start, end: u_end, start_slope: u_start_slope, end_slope: u_end_slope };
         self.on_the_way[self.oldest] = u.plus(self.controller.inputs.load);
         self.oldest = (self.oldest + 1) % self.on_the_way.len();
-        (start, u_start)
+        (y, u_start)
     }
 }
 
@@ -153,6 +165,8 @@ pub(super) struct Direct {
     z: DVector<f64>,
     y_row: DVector<f64>,
     u_row: DVector<f64>,
+    /// ẏ of the states.
+    slope_row: DVector<f64>,
 }
 
 impl Direct {
@@ -191,13 +205,22 @@ impl Direct {
         }
         let mut z = DVector::zeros(size);
         z[one] = 1.0;
-        Self { h, step: Step::new(&system, 0.0, h), z, y_row, u_row }
+        let slope_row = system.tr_mul(&y_row);
+        Self { h, step: Step::new(&system, 0.0, h), z, y_row, u_row, slope_row }
     }
 
     fn step(&mut self) -> (f64, f64) {
         let sample = (self.y_row.dot(&self.z), self.u_row.dot(&self.z));
         self.step.advance(&mut self.z, Hermite::default());
         sample
+    }
+
+    fn arc(&mut self) -> Hermite {
+        let at = |of: &Self| (of.y_row.dot(&of.z), of.slope_row.dot(&of.z));
+        let (start, start_slope) = at(self);
+        self.step.advance(&mut self.z, Hermite::default());
+        let (end, end_slope) = at(self);
+        Hermite { start, end, start_slope, end_slope }
     }
 }
 

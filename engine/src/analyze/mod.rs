@@ -4,6 +4,7 @@
 //! time responses, which [`metrics`] judges as it judges any recorded run. Seconds, rad/s, gains in PV units per MV
 //! unit. Non-finite gains give an unstable verdict, non-finite samples a typed error.
 
+mod absolute_error;
 mod analysis;
 mod closed_loop;
 mod frequency;
@@ -17,6 +18,7 @@ mod search;
 mod stability;
 mod sweep;
 
+pub(crate) use absolute_error::quick_iae;
 pub(crate) use analysis::unstable_loop_poles;
 pub use analysis::{
     Analysis, Peak, Peaks, analyze, analyze_loop, is_closed_loop_stable, is_loop_stable, peaks,

@@ -10,6 +10,9 @@ pub(crate) struct Realization {
     pub a: DMatrix<f64>,
     pub c: DVector<f64>,
     pub d: f64,
+    /// C A, and C B.
+    slope: DVector<f64>,
+    jump: f64,
 }
 
 /// Values and slopes of a signal at both ends of a step: the cubic between them.
@@ -38,6 +41,13 @@ impl Hermite {
         let rise = self.end - self.start;
         let (s0, s1) = (h * self.start_slope, h * self.end_slope);
         [self.start, s0, 2.0 * (3.0 * rise - 2.0 * s0 - s1), 6.0 * (s0 + s1 - 2.0 * rise)]
+    }
+
+    /// Value and slope, per second, at a share of a step of h seconds.
+    pub(crate) fn at(self, share: f64, h: f64) -> (f64, f64) {
+        let [value, first, second, third] = self.derivatives(h);
+        let slope = first + share * (second + 0.5 * share * third);
+        (value + share * (first + share * (0.5 * second + share * third / 6.0)), slope / h)
     }
 
     /// Integral over a step of h seconds.
@@ -70,7 +80,8 @@ impl Realization {
             a[(order - 1, i)] = -coefficient / scale;
             c[i] = (padded(order - i) - coefficient * d) / scale;
         }
-        Self { a, c, d }
+        let (slope, jump) = (a.tr_mul(&c), if order > 0 { c[order - 1] } else { 0.0 });
+        Self { a, c, d, slope, jump }
     }
 
     pub(crate) fn order(&self) -> usize {
@@ -83,23 +94,20 @@ impl Realization {
 
     /// ẏ, with v̇ given.
     pub(crate) fn output_slope(&self, x: &DVector<f64>, v: f64, v_slope: f64) -> f64 {
-        let mut slope = self.d * v_slope;
-        for i in 0..self.order() {
-            let row: f64 = (0..self.order()).map(|j| self.a[(i, j)] * x[j]).sum();
-            let input = if i + 1 == self.order() { v } else { 0.0 };
-            slope += self.c[i] * (row + input);
-        }
-        slope
+        self.slope.dot(x) + self.jump * v + self.d * v_slope
     }
 }
+
+/// Numbers of a column that are worked on together.
+const TOGETHER: usize = 4;
 
 /// The exact map of a state over one step: x⁺ = Φ x + Σ Γₖ v⁽ᵏ⁾ for an input cubic in time.
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
-    phi: DMatrix<f64>,
-    gamma: DMatrix<f64>,
+    /// Columns of Φ, then of Γ, each filled up with zeros to whole blocks.
+    columns: Vec<[f64; TOGETHER]>,
     h: f64,
-    scratch: DVector<f64>,
+    scratch: Vec<[f64; TOGETHER]>,
 }
 
 impl Step {
@@ -115,24 +123,31 @@ impl Step {
             joined[(n + k, n + k + 1)] = 1.0;
         }
         let exponential = joined.exp();
-        Self {
-            phi: exponential.view((0, 0), (n, n)).into_owned(),
-            gamma: exponential.view((0, n), (n, 4)).into_owned(),
-            h,
-            scratch: DVector::zeros(n),
+        let blocks = n.div_ceil(TOGETHER);
+        let mut columns = vec![[0.0; TOGETHER]; blocks * (n + 4)];
+        for j in 0..if n > 0 { n + 4 } else { 0 } {
+            for i in 0..n {
+                columns[j * blocks + i / TOGETHER][i % TOGETHER] = exponential[(i, j)];
+            }
         }
+        Self { columns, h, scratch: vec![[0.0; TOGETHER]; blocks] }
     }
 
     /// Moves the state on by one step; allocates nothing.
     pub(crate) fn advance(&mut self, x: &mut DVector<f64>, input: Hermite) {
         let v = input.derivatives(self.h);
-        let n = x.len();
-        for i in 0..n {
-            let free: f64 = (0..n).map(|j| self.phi[(i, j)] * x[j]).sum();
-            let forced: f64 = (0..4).map(|k| self.gamma[(i, k)] * v[k]).sum();
-            self.scratch[i] = free + forced;
+        self.scratch.fill([0.0; TOGETHER]);
+        let columns = self.columns.chunks_exact(self.scratch.len().max(1));
+        for (column, &factor) in columns.zip(x.iter().chain(&v)) {
+            for (sums, shares) in self.scratch.iter_mut().zip(column) {
+                for (sum, share) in sums.iter_mut().zip(shares) {
+                    *sum += share * factor;
+                }
+            }
         }
-        x.copy_from(&self.scratch);
+        for (x, sum) in x.iter_mut().zip(self.scratch.as_flattened()) {
+            *x = *sum;
+        }
     }
 }
 

@@ -1,10 +1,15 @@
-//! The integrator: classical Runge–Kutta in flux form, from one change of a delayed stream to the next.
+//! The integrator: Runge–Kutta with two derivatives in flux form, from one change of a delayed stream to the next.
+//!
+//! The slope of a flow comes with the flow almost for nothing (`dq/dt = dq/dh · dh/dt`), so that two stages give the fourth
+//! order and three the fifth (R. P. K. Chan, A. Y. J. Tsai, "On explicit two-derivative Runge–Kutta methods", Numer.
+//! Algorithms 53, 2010, pp. 171–194). Far from the bends of the √ laws a step takes two stages; near them it takes three
+//! and is cut where it would still be too long.
 //!
 //! A step sums the volume of every stream and moves exactly that volume, so that what leaves one tank arrives in
-//! the other. A sample that falls into a step is read from the cubic of every stream's volume through both its ends
-//! (Hermite), for which the flows are there anyway; levels follow from those volumes, so that the water adds up there too.
-//! Where all pumps have a transport delay, a step may so reach beyond the present sample; anything that is changed by hand
-//! cuts it there.
+//! the other. A sample that falls into a step is read from the quintic of every stream's volume through both its ends
+//! (Hermite), for which flows and their slopes are there anyway; levels follow from those volumes, so that the water adds
+//! up there too. Where all pumps have a transport delay, a step may so reach beyond the present sample; anything that is
+//! changed by hand cuts it there.
 //!
 //! That holds while no tank is at its rim or empty; there the steps end at the samples and [`super::rims`] mends
 //! the volumes.
@@ -13,15 +18,12 @@ use super::lanes::Number;
 use super::network::{Network, Pump};
 use super::pipe::Pipe;
 use super::roots::Roots;
-use super::streams::Streams;
+use super::streams::{Resolution, Streams};
 
-/// Largest λ·h of a step, well inside the stability region of the method (2.78).
-pub(super) const STEP_RATE: f64 = 0.4;
-/// Largest change of a head within a step, as a share of √(δ² + head²). It resolves the kink of the √ law at equal
-/// levels, and fast transients with it.
-pub(super) const STEP_CURVATURE: f64 = 0.15;
-/// Largest (λ·h)⁴ times the change of a head within a step, in cm: what the method's error is a small share of.
-pub(super) const STEP_ERROR_CM: f64 = 1e-4;
+/// What two stages resolve.
+const TWO_STAGES: Resolution = Resolution { curvature: 0.1, rate: 0.4, error_cm: 1e-4 };
+/// What three stages resolve: the kink of the √ law at equal levels, and fast transients with it.
+const THREE_STAGES: Resolution = Resolution { curvature: 0.4, rate: 0.4, error_cm: 3e-4 };
 /// Most pieces a step is cut into where δ = 0 makes the slope infinite.
 const MOST_PIECES: f64 = 64.0;
 /// Time below which nothing is left to do, in seconds.
@@ -65,9 +67,14 @@ pub(crate) struct Motion<const N: usize, const S: usize, V> {
     pub(super) start_flow: [V; S],
     pub(super) end_flow: [V; S],
     pub(super) volume: [V; S],
+    /// Slope of every flow at both ends of the step, in cm³/s².
+    start_bend: [V; S],
+    end_bend: [V; S],
     /// Head of every stream at the end in cm, and the slope that the streams bring it, in cm/s.
     heads: [V; S],
     net: [V; S],
+    /// dq/dh of every stream at the end, in cm²/s.
+    steepness: [V; S],
     /// What the flows at the end came from: those of the next step are near.
     roots: Roots<S, V>,
     /// dh/dt that pumps bring each node in the step, and each head, in cm/s.
@@ -92,37 +99,32 @@ pub(crate) struct Motion<const N: usize, const S: usize, V> {
     pub steps: u64,
 }
 
-/// Weights of both ends' values and slopes in the cubic through a step, at a share of it.
+/// Weights of both ends' volumes, flows and slopes of flows in the quintic through a step, at a share of it.
 #[derive(Debug, Clone, Copy)]
 struct Hermite {
-    /// Of the difference of the values.
+    /// Of the volume.
     rise: f64,
-    /// Of the slope at the start times the length.
+    /// Of the flows at start and end.
     start: f64,
-    /// Of the slope at the end times the length.
     end: f64,
+    /// Of the slopes of the flows at start and end.
+    start_bend: f64,
+    end_bend: f64,
 }
 
 impl Hermite {
     #[inline(always)]
     fn at(share: f64, length_s: f64) -> Self {
-        let left = 1.0 - share;
+        let (x, y) = (share, 1.0 - share);
+        let (x2, y2, half2_s) = (x * x, y * y, 0.5 * length_s * length_s);
         Self {
-            rise: share * share * (3.0 - 2.0 * share),
-            start: length_s * share * left * left,
-            end: -length_s * share * share * left,
+            rise: x2 * x * (1.0 + 3.0 * y * (1.0 + 2.0 * y)),
+            start: length_s * x * y2 * y * (1.0 + 3.0 * x),
+            end: -length_s * x2 * x * y * (1.0 + 3.0 * y),
+            start_bend: half2_s * x2 * y2 * y,
+            end_bend: half2_s * x2 * x * y2,
         }
     }
-}
-
-/// An array over nodes. A plain loop: `array::from_fn` is not always taken apart into vector instructions.
-#[inline(always)]
-fn nodes<const N: usize, V: Number>(node: impl Fn(usize) -> V) -> [V; N] {
-    let mut made = [V::of(0.0); N];
-    for (i, made) in made.iter_mut().enumerate() {
-        *made = node(i);
-    }
-    made
 }
 
 impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
@@ -156,8 +158,11 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
             start_flow: none,
             end_flow: none,
             volume: none,
+            start_bend: none,
+            end_bend: none,
             heads: none,
             net: none,
+            steepness: none,
             roots: Roots::none(),
             inflow: zero,
             head_inflow: none,
@@ -257,14 +262,17 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         let most_s = if self.look_ahead { change_s } else { change_s.min(left_s) };
         self.prepare_step();
         let slope = self.streams.each(|i| self.net[i] + self.head_inflow[i]);
-        let step_s = self.length_for(&slope, most_s, MOST_PIECES);
-        self.runge_kutta(slope, step_s);
+        let two_stages = self.streams.resolves(&self.heads, &slope, most_s, TWO_STAGES);
+        let step_s =
+            if two_stages { most_s } else { self.length_for(&slope, most_s, MOST_PIECES, THREE_STAGES) };
+        self.runge_kutta(&slope, step_s, two_stages);
         if !self.is_inside() {
             (self.end, self.end_flow) = (self.start, self.start_flow);
             self.no_step();
             return false;
         }
         self.evaluate_end();
+        self.end_bend = self.streams.each(|i| self.steepness[i] * (self.net[i] + self.head_inflow[i]));
         self.no_step();
         self.length_s = step_s;
         for (i, pipe) in self.pipes.iter_mut().enumerate() {
@@ -299,8 +307,14 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     /// Length of a step of at most `most_s` that resolves every stream from the present end, where the heads have this
     /// slope.
     #[inline(always)]
-    pub(super) fn length_for(&self, slope: &[V; S], most_s: f64, most_pieces: f64) -> f64 {
-        let pieces = self.streams.pieces(&self.heads, slope, most_s);
+    pub(super) fn length_for(
+        &self,
+        slope: &[V; S],
+        most_s: f64,
+        most_pieces: f64,
+        resolution: Resolution,
+    ) -> f64 {
+        let pieces = self.streams.pieces(&self.heads, slope, most_s, resolution);
         if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(most_pieces) } else { most_s }
     }
 
@@ -323,34 +337,58 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
 
     /// One step from `start`, whose flows are there and where the heads have this slope; gives `end` and the volume of
     /// every stream.
+    ///
+    /// ```text
+    /// two stages:    h(c) at c = ½,      V = τq₀ + τ²(q̇₀/6 + q̇(c)/3)
+    /// three stages:  h(c) at c = ⅖,      h(1) = h₀ + τḣ₀ + τ²(¾ḧ(c) − ¼ḧ₀),
+    ///                V = τq₀ + τ²(q̇₀/8 + 25q̇(c)/72 + q̇(1)/36)          with h(c) = h₀ + cτḣ₀ + ½c²τ²ḧ₀
+    /// ```
     #[inline(always)]
-    fn runge_kutta(&mut self, mut slope: [V; S], h: f64) {
-        let mut sum = self.start_flow;
-        for (share, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            let stage = self.streams.each(|i| self.heads[i] + slope[i] * (share * h));
-            let (flows, _) = self.streams.flows(&stage, &self.roots);
-            slope = self.streams.drive(&flows, &self.head_inflow);
-            sum = self.streams.each(|i| sum[i] + flows[i] * weight);
+    fn runge_kutta(&mut self, slope: &[V; S], step_s: f64, two_stages: bool) {
+        let none = [V::of(0.0); S];
+        let step2 = step_s * step_s;
+        self.start_bend = self.streams.each(|i| self.steepness[i] * slope[i]);
+        let (flow, bend) = (&self.start_flow, &self.start_bend);
+        let start_turn = self.streams.drive(bend, &none);
+        let share_s = step_s * if two_stages { 0.5 } else { 0.4 };
+        let middle = self
+            .streams
+            .each(|i| self.heads[i] + slope[i] * share_s + start_turn[i] * (0.5 * share_s * share_s));
+        let middle_bend = self.bend_at(&middle);
+        self.volume = if two_stages {
+            self.streams.each(|i| flow[i] * step_s + (bend[i] + middle_bend[i] * 2.0) * (step2 / 6.0))
+        } else {
+            let middle_turn = self.streams.drive(&middle_bend, &none);
+            let last = self.streams.each(|i| {
+                self.heads[i] + slope[i] * step_s + (middle_turn[i] * 3.0 - start_turn[i]) * (0.25 * step2)
+            });
+            let last_bend = self.bend_at(&last);
+            self.streams.each(|i| {
+                let bends = bend[i] * 9.0 + middle_bend[i] * 25.0 + last_bend[i] * 2.0;
+                flow[i] * step_s + bends * (step2 / 72.0)
+            })
+        };
+        for i in 0..N {
+            self.end[i] = self.start[i] + self.inflow[i] * step_s;
         }
-        self.volume = self.streams.each(|i| sum[i] * (h / 6.0));
-        self.end = self.after(&self.volume, h);
+        self.streams.bring(&self.volume, &mut self.end);
     }
 
-    /// Levels `passed_s` after the start, when the streams have moved these volumes.
+    /// Slope of every flow at these heads, in cm³/s².
     #[inline(always)]
-    fn after(&self, volume: &[V; S], passed_s: f64) -> [V; N] {
-        let mut levels = nodes(|i| self.start[i] + self.inflow[i] * passed_s);
-        self.streams.bring(volume, &mut levels);
-        levels
+    fn bend_at(&self, heads: &[V; S]) -> [V; S] {
+        let flowing = self.streams.flowing(heads, &self.roots);
+        let slope = self.streams.drive(&flowing.flow, &self.head_inflow);
+        self.streams.each(|i| flowing.steepness[i] * slope[i])
     }
 
-    /// Flows of the streams at the end of the step, and what they bring.
+    /// Flows of the streams at the end of the step, how they grow with the heads, and what they bring.
     #[inline(always)]
     pub(super) fn evaluate_end(&mut self) {
         self.heads = self.streams.heads(&self.end);
-        let (flows, roots) = self.streams.flows(&self.heads, &self.roots);
-        self.streams.keep(&roots, &mut self.roots);
-        self.end_flow = flows;
+        let flowing = self.streams.flowing(&self.heads, &self.roots);
+        self.streams.keep(&flowing, &mut self.roots);
+        (self.end_flow, self.steepness) = (flowing.flow, flowing.steepness);
         self.net = self.streams.drive(&self.end_flow, &[V::of(0.0); S]);
     }
 
@@ -371,13 +409,19 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
             self.now = self.end;
             return;
         }
-        // A cubic through both ends of the step.
         let w = Hermite::at(self.passed_s / self.length_s, self.length_s);
-        let volume = self
-            .streams
-            .each(|i| self.volume[i] * w.rise + self.start_flow[i] * w.start + self.end_flow[i] * w.end);
+        // A plain loop: a closure of this size is called instead of taken into the loop.
+        let mut volume = [V::of(0.0); S];
+        for (i, volume) in volume.iter_mut().enumerate().take(self.streams.slots()) {
+            let flows = self.start_flow[i] * w.start + self.end_flow[i] * w.end;
+            let bends = self.start_bend[i] * w.start_bend + self.end_bend[i] * w.end_bend;
+            *volume = self.volume[i] * w.rise + (flows + bends);
+        }
         self.count(volume, self.passed_s);
-        self.now = self.after(&volume, self.passed_s);
+        for i in 0..N {
+            self.now[i] = self.start[i] + self.inflow[i] * self.passed_s;
+        }
+        self.streams.bring(&volume, &mut self.now);
     }
 
     /// Adds what has passed of the present step, all of it, to the volumes of the span.

@@ -58,7 +58,7 @@ impl<V: Number> Pipe<V> {
     }
 
     /// Takes `duration_s` of stream off the front, at most [`Self::time_to_change_s`].
-    #[inline]
+    #[inline(always)]
     pub fn take(&mut self, duration_s: f64) {
         let Some(front) = self.pieces.front_mut() else { return };
         front.duration_s -= duration_s;
@@ -85,7 +85,7 @@ impl<V: Number> Pipe<V> {
     }
 
     /// Lets a flow in at the back for `duration_s`.
-    #[inline]
+    #[inline(always)]
     pub fn feed(&mut self, duration_s: f64, flow_cm3_s: V) {
         if self.delay_s <= SHORTEST_S {
             return;

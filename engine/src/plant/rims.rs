@@ -4,10 +4,13 @@
 use super::motion::{Motion, NO_TIME_S};
 use super::network::Network;
 use super::pipe::Pipe;
+use super::streams::Resolution;
 
 /// Longest step near a rim or an empty tank, in seconds.
 const CAREFUL_STEP_S: f64 = 0.1;
 
+/// What the classical Runge–Kutta method of such a step resolves.
+const CAREFUL: Resolution = Resolution { curvature: 0.15, rate: 0.4, error_cm: 1e-4 };
 /// Most pieces such a step is cut into: what empties does so in a moment anyway.
 const CAREFUL_PIECES: f64 = 8.0;
 
@@ -42,7 +45,7 @@ impl<const N: usize, const S: usize> Motion<N, S, f64> {
         // A tank held at its rim does not hurry.
         self.hold_at_rims(&self.start, &mut slope);
         let head_slope = self.streams.heads(&slope);
-        let step_s = self.length_for(&head_slope, most_s.min(CAREFUL_STEP_S), CAREFUL_PIECES);
+        let step_s = self.length_for(&head_slope, most_s.min(CAREFUL_STEP_S), CAREFUL_PIECES, CAREFUL);
         self.guarded_runge_kutta(slope, step_s);
         self.mend(network, step_s, fed, dry);
         self.evaluate_end();
@@ -51,7 +54,7 @@ impl<const N: usize, const S: usize> Motion<N, S, f64> {
         step_s
     }
 
-    /// One step from `start`, whose flows are there and where the levels have this slope; gives the volume of every
+    /// One step of the classical method from `start`, whose flows are there and where the levels have this slope; gives the volume of every
     /// stream.
     fn guarded_runge_kutta(&mut self, mut slope: [f64; N], h: f64) {
         let mut sum = self.start_flow;

@@ -100,6 +100,13 @@ impl Plant {
         Ok(plant)
     }
 
+    /// The same plant, moved in the vector registers of `arch`.
+    #[cfg(test)]
+    pub(crate) fn in_registers_of(mut self, arch: pulp::Arch) -> Self {
+        self.arch = arch;
+        self
+    }
+
     /// Lets `duration_s` pass with constant inputs. Flows afterwards are the means over `duration_s`.
     pub fn advance(&mut self, duration_s: f64) {
         self.dry.copy_from_slice(&self.airlocked);

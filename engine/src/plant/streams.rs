@@ -8,7 +8,6 @@
 //! flows do to every head is one small matrix.
 
 use super::lanes::Number;
-use super::motion::{STEP_CURVATURE, STEP_ERROR_CM, STEP_RATE};
 use super::network::Network;
 use super::roots::{Bends, Roots};
 use super::spec::{ValveDrive, ValveLaw};
@@ -20,6 +19,8 @@ const EXTRA: usize = 3;
 
 /// Up to this length a whole column is quicker than single nodes.
 const SHORT: usize = 16;
+/// So few streams are worked through one after the other without a count.
+const FEW: usize = 4;
 
 /// How many nodes or pumps a rig has, whichever are more.
 pub(crate) fn widest(network: &Network) -> usize {
@@ -52,6 +53,28 @@ impl Stream {
         // Nodes are below N; the mask says so to the compiler.
         nodes[self.from & (N - 1)] - nodes[self.against & (N - 1)]
     }
+}
+
+/// What a step may change so that a method resolves it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Resolution {
+    /// Largest change of a head, as a share of √(δ² + head²): what is left of the way to the singularity of the √ law.
+    pub curvature: f64,
+    /// Largest λ·h.
+    pub rate: f64,
+    /// Largest (λ·h)⁴ times the change of a head, in cm: what the method's error is a small share of.
+    pub error_cm: f64,
+}
+
+/// What streams do at some heads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Flowing<const S: usize, V> {
+    /// q in cm³/s.
+    pub flow: [V; S],
+    /// dq/dh in cm²/s.
+    pub steepness: [V; S],
+    /// x^(−¼).
+    roots: [V; S],
 }
 
 /// Every stream that is not shut.
@@ -197,7 +220,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     /// length.
     #[inline(always)]
     pub fn slots(&self) -> usize {
-        if S * V::PLANTS <= SHORT { S } else { self.streams.len().min(S) }
+        if S * V::PLANTS <= SHORT || S <= FEW { S } else { self.streams.len().min(S) }
     }
 
     /// An array over streams.
@@ -220,11 +243,18 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         heads
     }
 
-    /// Flow of every stream in cm³/s, and x^(−¼), from those of heads near by.
+    /// Flows at these heads, from the roots of heads near by.
     #[inline(always)]
-    pub fn flows(&self, heads: &[V; S], near: &Roots<S, V>) -> ([V; S], [V; S]) {
+    pub fn flowing(&self, heads: &[V; S], near: &Roots<S, V>) -> Flowing<S, V> {
         let roots = near.at(heads, &self.bends, self.slots());
-        (self.each(|i| self.k[i] * heads[i] * roots[i]), roots)
+        let (mut flow, mut steepness) = ([V::of(0.0); S], [V::of(0.0); S]);
+        for i in 0..self.slots() {
+            // dq/dh = k·x^(−¼)·(1 − h²/2x), and 1/x is the fourth power of the root.
+            let (square, steepest) = (roots[i] * roots[i], self.k[i] * roots[i]);
+            let bent = heads[i] * heads[i] * (square * square) * (self.bends.bend[i] * 0.5);
+            (flow[i], steepness[i]) = (steepest * heads[i], steepest * (V::of(1.0) - bent));
+        }
+        Flowing { flow, steepness, roots }
     }
 
     /// Slope of every head that flows bring, added to `base`, in cm/s.
@@ -246,10 +276,10 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         self.each(|i| even[i] + odd[i])
     }
 
-    /// Keeps x^(−¼), for flows near by.
+    /// Keeps the roots of these flows for others near by.
     #[inline(always)]
-    pub fn keep(&self, roots: &[V; S], kept: &mut Roots<S, V>) {
-        kept.keep(roots, &self.bends, self.slots());
+    pub fn keep(&self, flowing: &Flowing<S, V>, kept: &mut Roots<S, V>) {
+        kept.keep(&flowing.roots, &self.bends, self.slots());
     }
 
     /// Flow of every stream in cm³/s where nothing falls out of a tank that a stage of a step has taken below its floor.
@@ -258,7 +288,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         for (head, stream) in heads.iter_mut().zip(&self.streams) {
             *head = head.at_least(stream.least);
         }
-        self.flows(&heads, &Roots::none()).0
+        self.flowing(&heads, &Roots::none()).flow
     }
 
     /// Adds what the streams' volumes, or flows, bring every node, in cm or cm/s.
@@ -277,12 +307,9 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         }
     }
 
-    /// How many pieces a step of `step_s` must be cut into so that every stream is resolved; 1 when it needs no cut.
-    ///
-    /// No head changes by more than [`STEP_CURVATURE`] of √(δ² + head²), no rate times the step is above [`STEP_RATE`],
-    /// and where both are within their bounds, their product stays below [`STEP_ERROR_CM`].
+    /// Whether a step resolves every stream.
     #[inline(always)]
-    pub fn pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
+    pub fn resolves(&self, heads: &[V; S], slope: &[V; S], step_s: f64, most: Resolution) -> bool {
         let step2 = step_s * step_s;
         let step4 = step2 * step2;
         let mut worst = V::of(0.0);
@@ -291,16 +318,17 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
             let (change2, rate4) = (change * change, self.steepness4[i] * step4);
             // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
             let scale = r2 * self.bends.bend[i] + (V::of(1.0) - self.bends.bend[i]);
-            let error2 = scale * scale * (STEP_ERROR_CM * STEP_ERROR_CM);
-            worst = worst.larger(change2 - r2 * (STEP_CURVATURE * STEP_CURVATURE));
-            worst = worst.larger(rate4 - scale * STEP_RATE.powi(4));
+            let error2 = scale * scale * (most.error_cm * most.error_cm);
+            worst = worst.larger(change2 - r2 * (most.curvature * most.curvature));
+            worst = worst.larger(rate4 - scale * most.rate.powi(4));
             worst = worst.larger(rate4 * rate4 * change2 - error2);
         }
-        if worst.is_at_most(V::of(0.0)) { 1.0 } else { self.count_pieces(heads, slope, step_s) }
+        worst.is_at_most(V::of(0.0))
     }
 
+    /// How many pieces a step of `step_s` must be cut into so that every stream is resolved; 1 when it needs no cut.
     #[inline(never)]
-    fn count_pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64) -> f64 {
+    pub fn pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64, most: Resolution) -> f64 {
         let (mut bend2, mut rate4, mut error2) = (0.0_f64, 0.0_f64, 0.0_f64);
         let step4 = step_s * step_s * step_s * step_s;
         for i in 0..self.streams.len().min(S) {
@@ -315,8 +343,8 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
                 rate4 = rate4.max(rated4.largest());
             }
         }
-        let worst = (bend2.sqrt() / STEP_CURVATURE).max(rate4.sqrt().sqrt() / STEP_RATE).max(1.0);
+        let worst = (bend2.sqrt() / most.curvature).max(rate4.sqrt().sqrt() / most.rate).max(1.0);
         let error_cm = error2.sqrt();
-        if error_cm > STEP_ERROR_CM { worst.max((error_cm / STEP_ERROR_CM).powf(0.2)) } else { worst }
+        if error_cm > most.error_cm { worst.max((error_cm / most.error_cm).powf(0.2)) } else { worst }
     }
 }

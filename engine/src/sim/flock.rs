@@ -46,13 +46,25 @@ pub(super) fn run_flock(
     events: &[ScenarioEvent],
     samples: u64,
 ) -> Option<Vec<Seen>> {
+    run_flock_in(pulp::Arch::new(), start, rigs, measurement, events, samples)
+}
+
+/// As [`run_flock`], in the vector registers of `arch`.
+fn run_flock_in(
+    arch: pulp::Arch,
+    start: &ClosedLoop,
+    rigs: &[(Arc<Network>, u64)],
+    measurement: Measurement,
+    events: &[ScenarioEvent],
+    samples: u64,
+) -> Option<Vec<Seen>> {
     let network = start.network();
     match (widest(network), network.valves.len()) {
-        (0..=8, 0..=1) => Flock::<8, 1>::new(start, rigs, measurement).run(events, samples),
-        (0..=8, 2) => Flock::<8, 2>::new(start, rigs, measurement).run(events, samples),
-        (0..=8, 3) => Flock::<8, 3>::new(start, rigs, measurement).run(events, samples),
-        (0..=8, 4) => Flock::<8, 4>::new(start, rigs, measurement).run(events, samples),
-        _ => Flock::<LONGEST, LONGEST>::new(start, rigs, measurement).run(events, samples),
+        (0..=8, 0..=1) => Flock::<8, 1>::new(start, rigs, measurement).run(arch, events, samples),
+        (0..=8, 2) => Flock::<8, 2>::new(start, rigs, measurement).run(arch, events, samples),
+        (0..=8, 3) => Flock::<8, 3>::new(start, rigs, measurement).run(arch, events, samples),
+        (0..=8, 4) => Flock::<8, 4>::new(start, rigs, measurement).run(arch, events, samples),
+        _ => Flock::<LONGEST, LONGEST>::new(start, rigs, measurement).run(arch, events, samples),
     }
 }
 
@@ -114,8 +126,8 @@ impl<'a, const N: usize, const S: usize> Flock<'a, N, S> {
     }
 
     /// Runs all samples; `None` when a tank came to its rim or ran empty, or a command was refused.
-    fn run(self, events: &'a [ScenarioEvent], samples: u64) -> Option<Vec<Seen>> {
-        pulp::Arch::new().dispatch(AllSamples { flock: self, events, samples })
+    fn run(self, arch: pulp::Arch, events: &'a [ScenarioEvent], samples: u64) -> Option<Vec<Seen>> {
+        arch.dispatch(AllSamples { flock: self, events, samples })
     }
 
     #[inline(always)]
@@ -152,5 +164,52 @@ impl<'a, const N: usize, const S: usize> Flock<'a, N, S> {
         let of_loop = self.loops.iter_mut().find(|l| l.tag == *tag)?;
         let rim_cm = self.rigs[0].0.tanks[of_loop.tank].height_cm;
         of_loop.apply(command, rim_cm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{PidGains, PidTuning};
+    use crate::plant::RigSpec;
+
+    const STAD: &str = include_str!("../../../assets/rigs/stad.toml");
+
+    /// Ten minutes of a pump that noise throws about, so that the levels of TQ1 and TQ2 cross and steps are cut.
+    fn lively() -> (Arc<Network>, ClosedLoop) {
+        let spec = toml::from_str::<RigSpec>(STAD).expect("a rig");
+        let network = Arc::new(Network::new(spec).expect("a rig"));
+        let mut closed = ClosedLoop::simulated(network.clone(), 0, Measurement::DEFAULT, 1).expect("starts");
+        let tuning = PidTuning::new(PidGains::pid(7.0, 15.0, 1.0));
+        closed.apply(&RigCommand::Tuning { tag: "LIC-02".to_owned(), tuning }).expect("a tuning");
+        (network, closed)
+    }
+
+    #[test]
+    fn lanes_give_the_same_bytes_in_the_widest_registers_and_in_the_narrowest() {
+        let (network, closed) = lively();
+        let rigs: Vec<_> = (0..PLANTS as u64).map(|seed| (network.clone(), seed)).collect();
+        let run = |arch| run_flock_in(arch, &closed, &rigs, Measurement::DEFAULT, &[], 3000).expect("runs");
+        // Written out, numbers differ where their bytes do.
+        let [wide, narrow] = [pulp::Arch::new(), pulp::Arch::Scalar].map(|arch| format!("{:?}", run(arch)));
+        assert_eq!(wide, narrow);
+    }
+
+    #[test]
+    fn one_plant_gives_the_same_bytes_in_the_widest_registers_and_in_the_narrowest() {
+        let (_, closed) = lively();
+        let mut wide = closed.source().plant().expect("a plant").clone();
+        let mut narrow = wide.clone().in_registers_of(pulp::Arch::Scalar);
+        for sample in 0..3000_u32 {
+            let input = 2.2 + 0.9 * (f64::from(sample) * 0.9).sin();
+            for plant in [&mut wide, &mut narrow] {
+                plant.set_input(0, input).expect("a number");
+                plant.advance(0.2);
+            }
+            let bits = |plant: &crate::plant::Plant| {
+                plant.levels_cm().iter().map(|l| l.to_bits()).collect::<Vec<_>>()
+            };
+            assert_eq!(bits(&wide), bits(&narrow), "sample {sample}");
+        }
     }
 }

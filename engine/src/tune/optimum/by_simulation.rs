@@ -10,7 +10,7 @@ use super::problem::{DerivativeFilter, Objective, Process, Wanted};
 use super::simplex::{Simplex, minimise};
 use super::slice::Lead;
 use super::solve::Solver;
-use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_response};
+use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_response, quick_iae};
 
 /// Rounds of exact checks of the result.
 const ROUNDS: usize = 20;
@@ -37,6 +37,8 @@ const KP_HALVINGS: u32 = 12;
 const MOST_WORST: usize = 6;
 const SAME: f64 = 1e-4;
 const SIMPLEX: Simplex = Simplex { step: 0.2, last_step: 2e-5, most_evaluations: 160 };
+/// Once more about the best of all, since a simplex can get stuck on an edge that limits make.
+const AGAIN: Simplex = Simplex { step: 0.05, last_step: 2e-5, most_evaluations: 100 };
 
 /// Least IAE, from the least Jv on.
 pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Optimum, OptimumError> {
@@ -157,17 +159,19 @@ fn searched_among(
 ) -> Option<Candidate> {
     let Candidate { lead, kp, .. } = *start;
     let mut best: Option<Candidate> = None;
-    for share in START_SHARES {
-        let from = place(filter, lead, kp.ln(), share.ln());
+    let go = |best: &mut Option<Candidate>, solver: &mut Solver<'_>, simplex: &Simplex, from: &[f64]| {
         let mut value = |x: &[f64]| {
             let Some(candidate) = candidate_at(solver, filter, x) else { return f64::INFINITY };
             let value = worst(solver, objective, &candidate, plants).1;
             if value.is_finite() && best.is_none_or(|b| value < b.value) {
-                best = Some(Candidate { value, ..candidate });
+                *best = Some(Candidate { value, ..candidate });
             }
             value
         };
-        minimise(&SIMPLEX, &from, &mut value);
+        minimise(simplex, from, &mut value);
+    };
+    for share in START_SHARES {
+        go(&mut best, solver, &SIMPLEX, &place(filter, lead, kp.ln(), share.ln()));
     }
     if let Some(filter) = filter
         && objective == Objective::IaeSetpoint
@@ -183,6 +187,13 @@ fn searched_among(
             };
             minimise(&FROM_AFAR, &from, &mut value);
         }
+    }
+    let (found, limits) = (best?, solver.limits);
+    if filter.is_some()
+        && let Some(largest) = solver.at_gain(Objective::MaxKi, &limits, found.lead, found.kp)
+    {
+        let share = (found.ki / largest.ki).min(1.0);
+        go(&mut best, solver, &AGAIN, &place(filter, found.lead, found.kp.ln(), share.ln()));
     }
     best
 }
@@ -278,22 +289,34 @@ fn candidate_at(solver: &mut Solver<'_>, filter: Option<DerivativeFilter>, x: &[
     Some(Candidate { ki: largest.ki * x[1].exp().min(1.0), ..largest })
 }
 
-/// IAE of the worst process; ∞ where a loop is unstable or does not settle.
+/// IAE of the worst process, as a response gives it; ∞ where a loop is unstable or does not settle.
 fn iae(solver: &Solver<'_>, objective: Objective, candidate: &Candidate) -> f64 {
     let all: Vec<usize> = (0..solver.family.plants.len()).collect();
-    worst(solver, objective, candidate, &all).1
+    let exactly = |open: &OpenLoop, excitation| {
+        let response = loop_response(open, excitation, &ResponseOptions::default());
+        let settled = response.end == ResponseEnd::Settled;
+        response.metrics().ok().filter(|_| settled).map(|m| m.iae)
+    };
+    worst_by(solver, objective, candidate, &all, &exactly).1
 }
 
-/// Which of some processes is the worst, with its IAE.
+/// Which of some processes is the worst, with its IAE as a search sees it.
 fn worst(solver: &Solver<'_>, objective: Objective, candidate: &Candidate, plants: &[usize]) -> (usize, f64) {
+    worst_by(solver, objective, candidate, plants, &quick_iae)
+}
+
+fn worst_by(
+    solver: &Solver<'_>,
+    objective: Objective,
+    candidate: &Candidate,
+    plants: &[usize],
+    iae: &dyn Fn(&OpenLoop, Excitation) -> Option<f64>,
+) -> (usize, f64) {
     let excitation = if objective == Objective::IaeLoad { Excitation::Load } else { Excitation::Setpoint };
     let gains = solver.family.gains(candidate.lead, candidate.kp, candidate.ki);
     let of = |process: &Process| -> f64 {
         let Process::Model(model) = process else { return f64::INFINITY };
-        let response =
-            loop_response(&OpenLoop::of_parallel(model, &gains), excitation, &ResponseOptions::default());
-        let settled = response.end == ResponseEnd::Settled;
-        response.metrics().ok().filter(|_| settled).map_or(f64::INFINITY, |m| m.iae)
+        iae(&OpenLoop::of_parallel(model, &gains), excitation).unwrap_or(f64::INFINITY)
     };
     let each = plants.iter().map(|&i| (i, of(solver.family.plants[i].process)));
     each.fold((0, 0.0), |worst, one| if one.1 > worst.1 { one } else { worst })

@@ -148,6 +148,7 @@ impl GainSearch {
     /// Searches for given Td and Tf.
     pub fn run(&mut self, on: &Ground<'_, '_>, lead: Lead, care: Care) -> Found {
         let mut task = Task::new(on, lead);
+        self.allowed.limit(on.points, &on.limits);
         if !matches!(care, Care::Near(_) | Care::CoarseNear(_)) {
             let family = on.family;
             task.stabilising = family.stabilising(&task.shaped);
@@ -166,6 +167,7 @@ impl GainSearch {
     /// The best Ki of one gain, taken to stabilise with a small Ki.
     pub fn at_gain(&mut self, on: &Ground<'_, '_>, lead: Lead, kp: f64) -> Option<Candidate> {
         let task = Task::new(on, lead);
+        self.allowed.limit(on.points, &on.limits);
         let found = self.at(&task, kp);
         found.value.is_finite().then_some(Candidate { lead, kp, ki: found.ki, value: found.value })
     }
@@ -290,7 +292,7 @@ impl GainSearch {
         if let Some(relax) = &task.relax {
             return self.least_at(task, relax, kp);
         }
-        self.allowed.at(&task.shaped, &task.limits, kp);
+        self.allowed.at(&task.shaped, kp);
         if self.allowed.intervals.is_empty() {
             return nothing;
         }
@@ -350,7 +352,8 @@ impl GainSearch {
         const RATIO: f64 = 1.0 + 1e-6;
         let mut counted = false;
         let mut met = |above: f64| -> Option<f64> {
-            self.allowed.at(&task.shaped, &relax.limits(above), kp);
+            self.allowed.limit(task.shaped.points, &relax.limits(above));
+            self.allowed.at(&task.shaped, kp);
             let unit = kp.max(f64::MIN_POSITIVE) * task.family.plants[0].typical_omega();
             self.allowed.intervals.iter().find_map(|&(low, high)| {
                 let ki = if high.is_finite() { 0.5 * (low + high) } else { low + unit };

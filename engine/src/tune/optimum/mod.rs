@@ -14,6 +14,7 @@
 
 mod by_simulation;
 mod certificate;
+mod circles;
 mod error;
 mod family;
 mod floor;

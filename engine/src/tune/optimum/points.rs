@@ -26,6 +26,9 @@ pub(super) struct Points {
     pub g_re: Vec<f64>,
     pub g_im: Vec<f64>,
     pub g_sqr: Vec<f64>,
+    /// 1/G.
+    pub inverse_re: Vec<f64>,
+    pub inverse_im: Vec<f64>,
 }
 
 impl Points {
@@ -38,6 +41,8 @@ impl Points {
         self.g_re.push(g.re);
         self.g_im.push(g.im);
         self.g_sqr.push(sqr);
+        self.inverse_re.push(g.re / sqr);
+        self.inverse_im.push(-g.im / sqr);
     }
 
     pub fn len(&self) -> usize {
@@ -49,6 +54,8 @@ impl Points {
         self.g_re.extend(&other.g_re);
         self.g_im.extend(&other.g_im);
         self.g_sqr.extend(&other.g_sqr);
+        self.inverse_re.extend(&other.inverse_re);
+        self.inverse_im.extend(&other.inverse_im);
     }
 
     /// The points that bear on gains about these: at which a limit, or the objective, is near its largest.
@@ -83,6 +90,8 @@ impl Points {
             chosen.g_re.push(self.g_re[i]);
             chosen.g_im.push(self.g_im[i]);
             chosen.g_sqr.push(self.g_sqr[i]);
+            chosen.inverse_re.push(self.inverse_re[i]);
+            chosen.inverse_im.push(self.inverse_im[i]);
         }
         chosen
     }

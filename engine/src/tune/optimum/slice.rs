@@ -1,20 +1,19 @@
 //! All Ki at one Kp: which of them meet every limit, and which of those is best.
 //!
-//! At a fixed Kp, with x = Ki/ω and P = G·F, F = 1 + s Td/(1 + s Tf), each limit is at each frequency a quadratic
-//! inequality in x:
+//! At a fixed Kp, with x = Ki/ω and F = 1 + s Td/(1 + s Tf), the controller C = Kp F − jx moves along a straight line at
+//! each frequency, and each limit is a circle that it must not enter, or not leave ([`super::circles`]):
 //!
 //! ```text
-//! |1 + L|² = N(x) = |G|² x² − 2 m x + a,   a = |1 + Kp P|²,   m = |G|² Kp Im F − Im G
-//! |S| ≤ Ms     N ≥ 1/Ms²
-//! |T| ≤ Mt     Mt² N ≥ |G|² (x² − 2 Kp Im F x + Kp² |F|²)
-//! |C S| ≤ Ju   Ju² N ≥        x² − 2 Kp Im F x + Kp² |F|²
+//! |C − c|² = r² + (x − ξ)²,   r = Kp Re F − Re c,   ξ = Kp Im F − Im c
 //! ```
 //!
-//! so the Ki that meet them all come out in closed form as a few intervals. The load sensitivity is as simple: with
-//! D = ω² N/|G|² = Ki² − 2 p Ki + q, p = ω m/|G|², q = ω² a/|G|², 1/Jv² is Ki² plus the lower envelope of straight lines,
-//! to which the limit ω → 0, Jv ≥ 1/Ki, adds the line 0. Source of the idea: Åström, Panagopoulos and Hägglund,
-//! Design of PI controllers based on non-convex optimization, Automatica 34, 1998; the closed form in Ki is our own.
+//! so the Ki that meet them all come out in closed form as a few intervals, and a frequency whose circle the line misses
+//! costs a product and a comparison. The load sensitivity is as simple: with c = −1/G, ω² |C − c|² = Ki² − 2 p Ki + q,
+//! p = ω ξ, q = ω² (ξ² + r²), and 1/Jv² is Ki² plus the lower envelope of straight lines, to which the limit ω → 0,
+//! Jv ≥ 1/Ki, adds the line 0. Source of the idea: Åström, Panagopoulos and Hägglund, Design of PI controllers based on
+//! non-convex optimization, Automatica 34, 1998; the closed form in Ki is our own.
 
+use super::circles::{Circles, Side};
 use super::points::Points;
 use super::problem::LoopLimits;
 
@@ -34,45 +33,34 @@ impl Lead {
     }
 }
 
-/// Points with P = G·F at each.
+/// Points with F at each.
 #[derive(Debug, Clone)]
 pub(super) struct Shaped<'a> {
     pub points: &'a Points,
     pub lead: Lead,
-    f_im: Vec<f64>,
-    f_sqr: Vec<f64>,
-    pub p_re: Vec<f64>,
-    pub p_im: Vec<f64>,
-    p_sqr: Vec<f64>,
+    pub f_re: Vec<f64>,
+    pub f_im: Vec<f64>,
 }
 
 impl<'a> Shaped<'a> {
     pub fn new(points: &'a Points, lead: Lead) -> Self {
         let n = points.len();
-        let mut shaped = Self {
-            points,
-            lead,
-            f_im: vec![0.0; n],
-            f_sqr: vec![1.0; n],
-            p_re: points.g_re.clone(),
-            p_im: points.g_im.clone(),
-            p_sqr: points.g_sqr.clone(),
-        };
-        if lead.td_s == 0.0 {
-            return shaped;
-        }
-        for i in 0..n {
-            let omega = points.omega[i];
-            let filter = omega * lead.tf_s;
-            let im = omega * lead.td_s / (1.0 + filter * filter);
-            let re = 1.0 + im * filter;
-            let sqr = re * re + im * im;
-            (shaped.f_im[i], shaped.f_sqr[i]) = (im, sqr);
-            shaped.p_re[i] = points.g_re[i] * re - points.g_im[i] * im;
-            shaped.p_im[i] = points.g_re[i] * im + points.g_im[i] * re;
-            shaped.p_sqr[i] = points.g_sqr[i] * sqr;
+        let mut shaped = Self { points, lead, f_re: vec![1.0; n], f_im: vec![0.0; n] };
+        if lead.td_s > 0.0 {
+            for ((omega, re), im) in points.omega.iter().zip(&mut shaped.f_re).zip(&mut shaped.f_im) {
+                let filter = omega * lead.tf_s;
+                *im = omega * lead.td_s / (1.0 + filter * filter);
+                *re = 1.0 + *im * filter;
+            }
         }
         shaped
+    }
+
+    /// P = G·F at a point, real and imaginary part.
+    pub fn process(&self, i: usize) -> (f64, f64) {
+        let (g_re, g_im) = (self.points.g_re[i], self.points.g_im[i]);
+        let (f_re, f_im) = (self.f_re[i], self.f_im[i]);
+        (g_re * f_re - g_im * f_im, g_re * f_im + g_im * f_re)
     }
 }
 
@@ -80,7 +68,10 @@ impl<'a> Shaped<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Allowed {
     pub intervals: Vec<(f64, f64)>,
+    circles: Circles,
     forbidden: Vec<(f64, f64)>,
+    /// Squares of what a line leaves of a circle's radius.
+    room: Vec<f64>,
 }
 
 /// Neighbouring frequencies forbid overlapping stretches: they are joined as they come.
@@ -92,82 +83,68 @@ impl Joining {
     fn add(&mut self, low: f64, high: f64, to: &mut Vec<(f64, f64)>) {
         match &mut self.open {
             Some(open) if low <= open.1 && high >= open.0 => {
-                open.0 = open.0.min(low);
-                open.1 = open.1.max(high);
+                // Plain comparisons: none of them is no number.
+                if low < open.0 {
+                    open.0 = low;
+                }
+                if high > open.1 {
+                    open.1 = high;
+                }
             }
             open => to.extend(open.replace((low, high))),
         }
     }
 }
 
-/// Positive x with q2 x² − 2 q1 x + q0 < 0 for q2 > 0.
-#[inline]
-fn forbidden(q2: f64, q1: f64, q0: f64) -> Option<(f64, f64)> {
-    if q0 >= 0.0 && q1 <= 0.0 {
-        return None;
-    }
-    let discriminant = q1 * q1 - q2 * q0;
-    if discriminant <= 0.0 {
-        return None;
-    }
-    let root = discriminant.sqrt();
-    if q1 > 0.0 {
-        let far = q1 + root;
-        Some(((q0 / far).max(0.0), far / q2))
-    } else {
-        // q0 < 0: one root on each side of 0.
-        Some((0.0, q0 / (q1 - root)))
-    }
-}
-
 impl Allowed {
+    /// Takes the limits that [`Self::at`] goes by, on these points.
+    pub fn limit(&mut self, points: &Points, limits: &LoopLimits) {
+        self.circles.set(points, limits);
+    }
+
     /// Fills the intervals for a gain; there may be none.
-    pub fn at(&mut self, shaped: &Shaped<'_>, limits: &LoopLimits, kp: f64) {
-        let points = shaped.points;
+    pub fn at(&mut self, shaped: &Shaped<'_>, kp: f64) {
         self.intervals.clear();
         self.forbidden.clear();
+        let Self { circles, forbidden, room, .. } = self;
         let (mut lowest, mut highest) = (0.0f64, f64::INFINITY);
-        let mut joining = [const { Joining { open: None } }; 3];
-        let s_level = 1.0 / (limits.ms * limits.ms);
-        let (t_sqr, u_sqr) = (limits.mt * limits.mt, limits.ju * limits.ju);
-        let kp_sqr = kp * kp;
-        for i in 0..points.len() {
-            let (omega, g_sqr) = (points.omega[i], points.g_sqr[i]);
-            let a = 1.0 + 2.0 * kp * shaped.p_re[i] + kp_sqr * shaped.p_sqr[i];
-            let m = kp * g_sqr * shaped.f_im[i] - points.g_im[i];
-            if let Some((low, high)) = forbidden(g_sqr, m, a - s_level) {
-                joining[0].add(low * omega, high * omega, &mut self.forbidden);
+        let omega = &shaped.points.omega;
+        let mut keep_in = |low: f64, high: f64| {
+            if low > lowest {
+                lowest = low;
             }
-            if t_sqr.is_finite() {
-                let q2 = (t_sqr - 1.0) * g_sqr;
-                let q1 = t_sqr * m - g_sqr * kp * shaped.f_im[i];
-                let q0 = t_sqr * a - kp_sqr * shaped.p_sqr[i];
-                if q2 > 1e-12 * g_sqr {
-                    if let Some((low, high)) = forbidden(q2, q1, q0) {
-                        joining[1].add(low * omega, high * omega, &mut self.forbidden);
-                    }
-                } else if q1 > 0.0 {
-                    highest = highest.min(omega * q0 / (2.0 * q1));
-                } else if q0 < 0.0 {
-                    lowest = if q1 < 0.0 { lowest.max(omega * q0 / (2.0 * q1)) } else { f64::INFINITY };
-                }
+            if high < highest {
+                highest = high;
             }
-            if u_sqr.is_finite() {
-                let q2 = u_sqr * g_sqr - 1.0;
-                let q1 = u_sqr * m - kp * shaped.f_im[i];
-                let q0 = u_sqr * a - kp_sqr * shaped.f_sqr[i];
-                if q2 > 0.0 {
-                    if let Some((low, high)) = forbidden(q2, q1, q0) {
-                        joining[2].add(low * omega, high * omega, &mut self.forbidden);
-                    }
-                } else {
-                    let (low, high) = between_roots(q2, q1, q0);
-                    lowest = lowest.max(low * omega);
-                    highest = highest.min(high * omega);
-                }
+        };
+        for circle in &circles.inside {
+            let (low, high) = circle.inside(shaped, kp);
+            keep_in(low * omega[circle.point], high * omega[circle.point]);
+        }
+        for circle in &circles.turned {
+            let omega = omega[circle.point];
+            match circle.side(shaped, kp) {
+                Side::Leaves(low, high) => keep_in(low * omega, high * omega),
+                Side::Takes(taken) => forbidden.extend(taken.map(|(low, high)| (low * omega, high * omega))),
             }
         }
-        self.forbidden.extend(joining.iter().filter_map(|j| j.open));
+        if lowest >= highest {
+            return;
+        }
+        for kind in circles.forbidden() {
+            kind.room(shaped, kp, room);
+            let mut joining = Joining { open: None };
+            let places = shaped.f_im.iter().zip(&kind.centre_im).zip(omega);
+            for (&room, ((f_im, centre_im), omega)) in room.iter().zip(places) {
+                if room > 0.0 {
+                    let (centre, root) = (kp * f_im - centre_im, room.sqrt());
+                    if centre + root > 0.0 {
+                        joining.add((centre - root) * omega, (centre + root) * omega, forbidden);
+                    }
+                }
+            }
+            forbidden.extend(joining.open);
+        }
         self.complement(lowest, highest);
     }
 
@@ -189,32 +166,13 @@ impl Allowed {
     }
 }
 
-/// Where q2 x² − 2 q1 x + q0 ≥ 0 for q2 ≤ 0: between the roots; an empty interval where nowhere.
-fn between_roots(q2: f64, q1: f64, q0: f64) -> (f64, f64) {
-    const NOWHERE: (f64, f64) = (f64::INFINITY, 0.0);
-    if q2 == 0.0 {
-        return match (q1 > 0.0, q0 >= 0.0) {
-            (true, _) => (0.0, q0 / (2.0 * q1)),
-            (false, true) => (0.0, f64::INFINITY),
-            (false, false) => (if q1 < 0.0 { q0 / (2.0 * q1) } else { f64::INFINITY }, f64::INFINITY),
-        };
-    }
-    let discriminant = q1 * q1 - q2 * q0;
-    if discriminant < 0.0 {
-        return NOWHERE;
-    }
-    let root = discriminant.sqrt();
-    // Of both roots the one without cancellation first, the other by their product.
-    let sum = if q1 > 0.0 { q1 + root } else { q1 - root };
-    let (one, two) = (sum / q2, if sum == 0.0 { 0.0 } else { q0 / sum });
-    (one.min(two).max(0.0), one.max(two))
-}
-
 /// 1/Jv² over Ki at one Kp: Ki² plus the lower envelope of the lines q − 2 p Ki.
 #[derive(Debug, Default)]
 pub(super) struct LoadEnvelope {
     p: Vec<f64>,
     q: Vec<f64>,
+    /// The lines that come below 0 between the Ki under search.
+    low: Vec<EnvelopeLine>,
 }
 
 /// A line of the envelope.
@@ -230,31 +188,41 @@ impl LoadEnvelope {
         let n = points.len();
         self.p.resize(n, 0.0);
         self.q.resize(n, 0.0);
+        let (omega, re, im) = (&points.omega[..n], &points.inverse_re[..n], &points.inverse_im[..n]);
+        let (f_re, f_im, p, q) = (&shaped.f_re[..n], &shaped.f_im[..n], &mut self.p[..n], &mut self.q[..n]);
         for i in 0..n {
-            let g_sqr = points.g_sqr[i];
-            let a = 1.0 + 2.0 * kp * shaped.p_re[i] + kp * kp * shaped.p_sqr[i];
-            let scale = points.omega[i] / g_sqr;
-            self.p[i] = scale * (kp * g_sqr * shaped.f_im[i] - points.g_im[i]);
-            self.q[i] = scale * points.omega[i] * a;
+            let away = omega[i] * (re[i] + kp * f_re[i]);
+            p[i] = omega[i] * (im[i] + kp * f_im[i]);
+            q[i] = p[i] * p[i] + away * away;
+        }
+    }
+
+    /// Keeps the lines that come below 0 between two Ki; a line that does not at either does not between them.
+    fn keep_low(&mut self, low: f64, high: f64) {
+        self.low.clear();
+        for (&p, &q) in self.p.iter().zip(&self.q) {
+            if (q < 2.0 * p * low) | (q < 2.0 * p * high) {
+                self.low.push(EnvelopeLine { p, q });
+            }
         }
     }
 
     /// The lowest line at a Ki; the limit ω → 0 is the line 0.
     fn lowest(&self, ki: f64) -> EnvelopeLine {
         let (mut best, mut value) = (EnvelopeLine { p: 0.0, q: 0.0 }, 0.0);
-        let twice = 2.0 * ki;
-        for (p, q) in self.p.iter().zip(&self.q) {
-            let line = q - twice * p;
-            if line < value {
-                (best, value) = (EnvelopeLine { p: *p, q: *q }, line);
+        for line in &self.low {
+            let here = line.q - 2.0 * line.p * ki;
+            if here < value {
+                (best, value) = (*line, here);
             }
         }
         best
     }
 
     /// The Ki between two that gives the least Jv, with that Jv.
-    pub fn best(&self, low: f64, high: f64) -> (f64, f64) {
+    pub fn best(&mut self, low: f64, high: f64) -> (f64, f64) {
         const STEPS: usize = 40;
+        self.keep_low(low, high);
         let value = |ki: f64, line: EnvelopeLine| ki * ki + line.q - 2.0 * line.p * ki;
         let (mut left, mut right) = ((low, self.lowest(low)), (high, self.lowest(high)));
         let mut best = (high, value(high, right.1));

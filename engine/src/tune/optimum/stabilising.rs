@@ -147,7 +147,7 @@ impl Family<'_> {
         }
         let own = self.own_points(plant);
         for i in own.start + 1..own.end {
-            let [(a_re, a_im), (b_re, b_im)] = [i - 1, i].map(|k| (shaped.p_re[k], shaped.p_im[k]));
+            let [(a_re, a_im), (b_re, b_im)] = [i - 1, i].map(|k| shaped.process(k));
             if (a_im > 0.0) != (b_im > 0.0) {
                 let re = (b_re * a_im - a_re * b_im) / (a_im - b_im);
                 if re < 0.0 {
@@ -169,6 +169,9 @@ pub(super) struct OverKi {
     /// Plants whose points do not tell.
     unknown: Vec<usize>,
     lead: Option<Lead>,
+    /// F at every point with this lead.
+    f_re: Vec<f64>,
+    f_im: Vec<f64>,
     kp: f64,
 }
 
@@ -177,6 +180,10 @@ impl OverKi {
     pub fn at(&mut self, family: &Family<'_>, lead: Lead, kp: f64) {
         self.crossings.clear();
         self.unknown.clear();
+        if self.lead != Some(lead) || self.f_re.len() != family.points.len() {
+            let shaped = Shaped::new(&family.points, lead);
+            (self.f_re, self.f_im) = (shaped.f_re, shaped.f_im);
+        }
         (self.lead, self.kp) = (Some(lead), kp);
         for (i, plant) in family.plants.iter().enumerate() {
             let measured = matches!(plant.process, Process::Measured(_));
@@ -184,35 +191,30 @@ impl OverKi {
             if measured || plant.resonant || (plant.high != 0.0 && plant.dead_time_s > 0.0) {
                 self.unknown.push(i);
             } else {
-                self.push(family, i, lead, kp);
+                self.push(family, i, kp);
             }
         }
     }
 
-    fn push(&mut self, family: &Family<'_>, plant: usize, lead: Lead, kp: f64) {
+    fn push(&mut self, family: &Family<'_>, plant: usize, kp: f64) {
         let points = &family.points;
         let at_point = |i: usize| {
-            let (omega, g_sqr) = (points.omega[i], points.g_sqr[i]);
-            let filter = omega * lead.tf_s;
-            let im = omega * lead.td_s / (1.0 + filter * filter);
-            (points.g_re[i] / g_sqr + kp * (1.0 + im * filter), omega * (kp * im - points.g_im[i] / g_sqr))
+            let (re, im) =
+                (points.inverse_re[i] + kp * self.f_re[i], points.inverse_im[i] + kp * self.f_im[i]);
+            (re, points.omega[i] * im)
         };
         let own = family.own_points(plant);
-        let mut before = 0.0;
+        let mut before = f64::NAN;
         for i in own.clone() {
-            let omega = points.omega[i];
-            let filter = omega * lead.tf_s;
-            let im = omega * lead.td_s / (1.0 + filter * filter);
-            // |G|² r has the sign of r and needs no division.
-            let r_of_g = points.g_re[i] + points.g_sqr[i] * kp * (1.0 + im * filter);
-            if i > own.start && (before > 0.0) != (r_of_g > 0.0) {
+            let now = points.inverse_re[i] + kp * self.f_re[i];
+            if i > own.start && (before > 0.0) != (now > 0.0) {
                 let [(r_before, ki_before), (r, ki)] = [i - 1, i].map(at_point);
                 let at = ki_before + (ki - ki_before) * r_before / (r_before - r);
                 if at > 0.0 {
                     self.crossings.push((plant, at, if r < 0.0 { 2 } else { -2 }));
                 }
             }
-            before = r_of_g;
+            before = now;
         }
     }
 
