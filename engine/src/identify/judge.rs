@@ -1,7 +1,7 @@
 //! From the numbers of a fit to findings about it.
 
 use super::FitVerdict;
-use super::model_fit::ModelFit;
+use super::model_fit::{LoadFit, ModelFit};
 use super::parameters::Parameter;
 use super::problem::{FitProblem, Stretch};
 use super::statistics::resolution;
@@ -47,6 +47,14 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
     if let Some((per_second, _)) = fit.drift {
         found.push(FitVerdict::Drift { per_hour: 3600.0 * per_second });
     }
+    found.extend(fit.loads.iter().map(|load| {
+        let LoadFit { at_s, change, .. } = *load;
+        if load.integrates() {
+            FitVerdict::LoadRate { at_s, per_hour: 3600.0 * change }
+        } else {
+            FitVerdict::Load { at_s, change }
+        }
+    }));
     if fit.segments > 1 {
         found.push(FitVerdict::Segments { count: fit.segments });
     }

@@ -122,6 +122,25 @@ pub enum FitVerdict {
         /// In PV units per hour.
         per_hour: f64,
     },
+    /// Something unmeasured moved the PV once, and was fitted along.
+    Load {
+        /// When, in seconds of the record.
+        at_s: f64,
+        /// What it adds to the PV, in PV units.
+        change: f64,
+    },
+    /// Something unmeasured changed the rate of an integrating PV once, and was fitted along.
+    LoadRate {
+        /// When, in seconds of the record.
+        at_s: f64,
+        /// What it adds to the rate, in PV units per hour.
+        per_hour: f64,
+    },
+    /// What came unmeasured came with a move of the MV.
+    LoadWithMv {
+        /// When, in seconds of the record.
+        at_s: f64,
+    },
     /// The stretch has gaps.
     Segments {
         /// Pieces fitted with a free state each.
@@ -204,6 +223,23 @@ impl std::fmt::Display for FitVerdict {
             Self::Drift { per_hour } => {
                 write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
             }
+            Self::Load { at_s, change } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: it adds {} to the PV and was fitted along",
+                n(*at_s),
+                n(*change)
+            ),
+            Self::LoadRate { at_s, per_hour } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: from there on the PV moves by {} more an hour, which was fitted along",
+                n(*at_s),
+                n(*per_hour)
+            ),
+            Self::LoadWithMv { at_s } => write!(
+                f,
+                "something unmeasured moved the process at t = {} s together with the MV: which of the two did what, this stretch hardly tells; move the MV once more on its own",
+                n(*at_s)
+            ),
             Self::Segments { count } => {
                 write!(f, "the stretch has gaps: fitted as {count} segments, each with its own start")
             }
@@ -237,6 +273,9 @@ impl Explain for FitVerdict {
             Self::ResidualsCorrelated { .. } => "verdict.residuals_correlated",
             Self::ResidualsFollowInput { .. } => "verdict.residuals_follow_input",
             Self::Drift { .. } => "verdict.drift",
+            Self::Load { .. } => "verdict.load",
+            Self::LoadRate { .. } => "verdict.load_rate",
+            Self::LoadWithMv { .. } => "verdict.load_with_mv",
             Self::Segments { .. } => "verdict.segments",
             Self::StartsAtRest { .. } => "verdict.starts_at_rest",
         }
@@ -286,6 +325,9 @@ impl Explain for FitVerdict {
                 vec![n("correlation", correlation), ("lag", lag.to_string())]
             }
             Self::Drift { per_hour } => vec![n("per_hour", per_hour)],
+            Self::Load { at_s, change } => vec![n("at_s", at_s), n("change", change)],
+            Self::LoadRate { at_s, per_hour } => vec![n("at_s", at_s), n("per_hour", per_hour)],
+            Self::LoadWithMv { at_s } => vec![n("at_s", at_s)],
             Self::Segments { count } => vec![("count", count.to_string())],
             Self::StartsAtRest { mv_before } => vec![n("mv_before", mv_before)],
         }
@@ -340,7 +382,12 @@ impl FitVerdict {
     pub fn is_objection(&self) -> bool {
         !matches!(
             self,
-            Self::Good { .. } | Self::Segments { .. } | Self::StartsAtRest { .. } | Self::Drift { .. }
+            Self::Good { .. }
+                | Self::Segments { .. }
+                | Self::StartsAtRest { .. }
+                | Self::Drift { .. }
+                | Self::Load { .. }
+                | Self::LoadRate { .. }
         )
     }
 
@@ -380,6 +427,9 @@ impl FitVerdict {
             Self::ResidualsCorrelated { correlation: 0.82, rows: 10.0 },
             Self::ResidualsFollowInput { correlation: 0.31, lag: 4 },
             Self::Drift { per_hour: -0.4 },
+            Self::Load { at_s: 420.0, change: -3.2 },
+            Self::LoadRate { at_s: 420.0, per_hour: 1.8 },
+            Self::LoadWithMv { at_s: 420.0 },
             Self::Segments { count: 3 },
             Self::StartsAtRest { mv_before: 0.0 },
         ]
