@@ -212,16 +212,30 @@ fn explore() {
         for closed in [false, true] {
             for place in [Place::Output, Place::Input] {
                 for at in [130, 300, 480] {
-                    for size in [0.0, 0.1, 0.3, 1.0] {
+                    for size in [0.0, 0.3, 1.0, 3.0] {
                         if size == 0.0 && (at != 300 || place == Place::Input) {
                             continue;
                         }
-                        let unit = match (process, place) { (Process::Integrator, Place::Output) => 1.0, (Process::Integrator, _) => 0.5, _ => 1.0};
+                        let unit = match (process, place) {
+                            (Process::Integrator, Place::Output) => 1.0,
+                            (Process::Integrator, _) => 0.5,
+                            _ => 1.0,
+                        };
                         let case = Case { process, closed, place, at, size: size * unit, rho: 0.0 };
                         let begun = std::time::Instant::now();
                         let c = count(&case, seeds);
-                        let line: Vec<String> = c.held.iter().map(|(n, h)| format!("{n} {:.1}", 100.0 * *h as f64 / seeds as f64)).collect();
-                        println!("{process:?} closed {closed} {place:?} at {at} size {size}: {} told {} placed {} ({:.1} ms)", line.join(" "), c.told, c.placed, begun.elapsed().as_secs_f64() * 1e3 / seeds as f64);
+                        let line: Vec<String> = c
+                            .held
+                            .iter()
+                            .map(|(n, h)| format!("{n} {:.1}", 100.0 * *h as f64 / seeds as f64))
+                            .collect();
+                        println!(
+                            "{process:?} closed {closed} {place:?} at {at} size {size}: {} told {} placed {} ({:.1} ms)",
+                            line.join(" "),
+                            c.told,
+                            c.placed,
+                            begun.elapsed().as_secs_f64() * 1e3 / seeds as f64
+                        );
                     }
                 }
             }
@@ -237,7 +251,11 @@ fn explore_coloured() {
             for rho in [0.5, 0.8, 0.9, 0.97] {
                 let case = Case { process, closed, place: Place::Output, at: 300, size: 0.0, rho };
                 let c = count(&case, seeds);
-                let line: Vec<String> = c.held.iter().map(|(n, h)| format!("{n} {:.1}", 100.0 * *h as f64 / seeds as f64)).collect();
+                let line: Vec<String> = c
+                    .held
+                    .iter()
+                    .map(|(n, h)| format!("{n} {:.1}", 100.0 * *h as f64 / seeds as f64))
+                    .collect();
                 println!("{process:?} closed {closed} rho {rho}: {} told {}", line.join(" "), c.told);
             }
         }

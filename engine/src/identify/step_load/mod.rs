@@ -7,7 +7,9 @@
 //! criterion, over independent rows only, speaks for it very strongly: the search over the time alone makes a likelihood
 //! ratio of 12 out of chance once in a hundred records (Andrews, Econometrica 61 (1993) 821), well below.
 
+mod noise;
 mod scan;
+mod start;
 
 use super::choose::{Choice, mean_squares, rank};
 use super::fit_structure::{profile_dead_times, reaches_s, report, shape_like};
@@ -16,7 +18,7 @@ use super::known::settled;
 use super::model_fit::ModelFit;
 use super::output_error::{Found, Linear, Order, Point, Shape, Work, again, evaluate, refine};
 use super::problem::{FitProblem, Stretch};
-use scan::{Candidate, candidates};
+use scan::{BINS, candidates};
 
 /// Most loads of a stretch.
 const MOST: usize = 3;
@@ -40,7 +42,14 @@ pub(super) fn with_loads_where_due(
     if is_exact(chosen) || !hints(stretch, chosen) {
         return drifting;
     }
-    let loaded: Vec<ModelFit> = plain.fits.iter().map(|fit| with_loads(problem, stretch, fit)).collect();
+    let mut loaded: Vec<ModelFit> = vec![];
+    // A second order starts where a first one has found its load.
+    let mut simplest_first: Vec<&ModelFit> = plain.fits.iter().collect();
+    simplest_first.sort_by_key(|fit| fit.coordinates.values.len());
+    for fit in simplest_first {
+        let with = with_loads(problem, stretch, fit, &loaded);
+        loaded.push(with);
+    }
     if loaded.iter().all(|fit| fit.loads.is_empty()) {
         return drifting;
     }
@@ -57,12 +66,21 @@ fn is_exact(fit: &ModelFit) -> bool {
     fit.fit_percent > 99.9999
 }
 
-/// How much Schwarz's criterion falls from one fit to another, over the rows that are independent in the other.
+/// How much Schwarz's criterion falls from one fit to another: over the rows that are independent in the other, and with
+/// coloured noise beside it; the lesser of the two.
 fn gained(from: &ModelFit, to: &ModelFit, stretch: &Stretch) -> f64 {
+    let added = to.unknowns as f64 - from.unknowns as f64;
     let n = independent_rows(to);
     let pair = [from.clone(), to.clone()];
     let squares = mean_squares(&pair, stretch);
-    n * (squares[0] / squares[1]).ln() - (to.unknowns as f64 - from.unknowns as f64) * n.ln()
+    let by_rows = n * (squares[0] / squares[1]).ln() - added * n.ln();
+    let counted = |fit: &ModelFit, row: usize| fit.residuals[row] != 0.0;
+    let both: Vec<usize> =
+        (0..from.residuals.len()).filter(|&row| counted(from, row) && counted(to, row)).collect();
+    let [without, with] =
+        [from, to].map(|fit| both.iter().map(|&row| fit.residuals[row]).collect::<Vec<f64>>());
+    let rows = both.len().max(10) as f64;
+    by_rows.min(noise::likelihood_ratio(&without, &with) - added * rows.ln())
 }
 
 fn independent_rows(fit: &ModelFit) -> f64 {
@@ -85,11 +103,11 @@ fn hints(stretch: &Stretch, fit: &ModelFit) -> bool {
 }
 
 /// A fit with as many loads as are beyond doubt; the fit itself where there is none.
-fn with_loads(problem: &FitProblem, stretch: &Stretch, plain: &ModelFit) -> ModelFit {
+fn with_loads(problem: &FitProblem, stretch: &Stretch, plain: &ModelFit, simpler: &[ModelFit]) -> ModelFit {
     let mut nested = vec![plain.clone()];
     while nested.len() <= MOST {
         let last = &nested[nested.len() - 1];
-        let Some(next) = with_another(problem, stretch, last) else { break };
+        let Some(next) = with_another(problem, stretch, last, simpler) else { break };
         if next.rows as f64 * (last.mse / next.mse).ln() < HINT {
             break;
         }
@@ -105,11 +123,16 @@ fn with_loads(problem: &FitProblem, stretch: &Stretch, plain: &ModelFit) -> Mode
 }
 
 /// A fit with one load more than another: the best there is.
-fn with_another(problem: &FitProblem, stretch: &Stretch, fit: &ModelFit) -> Option<ModelFit> {
+fn with_another(
+    problem: &FitProblem,
+    stretch: &Stretch,
+    fit: &ModelFit,
+    simpler: &[ModelFit],
+) -> Option<ModelFit> {
     let here = known(stretch, fit);
     let shape = shape_like(&here, fit);
     let at = evaluate(&here, &shape, fit.points(), &Linear::zero(&shape, &here))?;
-    let (shape, best) = best_of(&here, &shape, &at)?;
+    let (shape, best) = best_of(&here, &shape, &at, simpler)?;
     let mut work = Work::default();
     let refit = |known: &Stretch, from: &Found| again(known, &shape, &from.points, &mut work);
     let (here, found) = settled(stretch, here, best, |found| reaches_s(stretch, &shape, found), refit);
@@ -121,30 +144,37 @@ fn with_another(problem: &FitProblem, stretch: &Stretch, fit: &ModelFit) -> Opti
 }
 
 /// The most promising step and lag, descended to together with the process.
-fn best_of(here: &Stretch, shape: &Shape, at: &Found) -> Option<(Shape, Found)> {
+fn best_of(here: &Stretch, shape: &Shape, at: &Found, simpler: &[ModelFit]) -> Option<(Shape, Found)> {
     let thin = (here.len() > 2 * ROWS).then(|| here.thinned(here.len() / ROWS));
     let short = thin.as_ref().unwrap_or(here);
     let rows = short.kept() as f64;
-    let mut best: Option<(f64, Candidate, Found)> = None;
-    for candidate in candidates(here, shape, at).into_iter().filter(|c| c.score > HINT) {
-        let wider = with_load(shape, candidate.order);
-        let points = [&at.points[..], &[candidate.point]].concat();
+    let width_s = here.span_s() / BINS as f64;
+    let mut best: Option<(f64, Order, Found)> = None;
+    let hinted = candidates(here, shape, at).into_iter().filter(|c| c.score > HINT);
+    let mut starts: Vec<(Order, Vec<Point>)> =
+        hinted.map(|c| (c.order, [&at.points[..], &[c.point]].concat())).collect();
+    // A load as large as the moves of the MV has led the fit without it astray.
+    if shape.loads == 0 {
+        starts.extend(start::starts(here, shape, &at.points, simpler));
+    }
+    for (order, points) in starts {
+        let wider = with_load(shape, order);
         let Some(found) = refine(short, &wider, &points, PASSES, &mut 0) else { continue };
         // A lag shorter than a row is a jump between two rows, and has no time of its own.
         let load = found.points[found.points.len() - 1];
-        if candidate.order != Order::Jump && load.time_s < 0.5 * short.sample_time_s {
+        if order != Order::Jump && load.time_s < 0.5 * short.sample_time_s {
             continue;
         }
         let criterion = rows * found.rss().ln() + wider.parameters(short) as f64 * rows.ln();
         if best.as_ref().is_none_or(|b| criterion < b.0) {
-            best = Some((criterion, candidate, found));
+            best = Some((criterion, order, found));
         }
     }
-    let (_, candidate, found) = best?;
-    let wider = with_load(shape, candidate.order);
+    let (_, order, found) = best?;
+    let wider = with_load(shape, order);
     let found = refine(here, &wider, &found.points, 3 * PASSES, &mut 0)?;
-    let jumps = candidate.order == Order::Jump;
-    Some((wider.clone(), if jumps { at_the_best_row(here, &wider, found, candidate.width_s) } else { found }))
+    let jumps = order == Order::Jump;
+    Some((wider.clone(), if jumps { at_the_best_row(here, &wider, found, width_s) } else { found }))
 }
 
 fn with_load(shape: &Shape, order: Order) -> Shape {

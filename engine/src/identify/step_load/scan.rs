@@ -7,7 +7,7 @@ use crate::identify::output_error::{Found, Order, Point, Shape, blocks, derivati
 use crate::identify::problem::Stretch;
 
 /// Bins of a stretch.
-const BINS: usize = 300;
+pub(super) const BINS: usize = 300;
 /// Segments beyond which a stretch is too broken to be searched.
 const SEGMENTS: usize = 8;
 /// Part of a step that must be left once the sensitivities are taken out of it.
@@ -24,8 +24,8 @@ pub(super) struct Candidate {
     pub point: Point,
     /// By how much it lowers the squared residuals, in mean squares.
     pub score: f64,
-    /// Width of a bin, in seconds.
-    pub width_s: f64,
+    /// The squared residuals that it leaves at these dynamics.
+    pub left: f64,
 }
 
 /// The steps that the residuals of a fit speak for most, a few of each kind.
@@ -71,6 +71,7 @@ struct Bins {
     residual: Vec<f64>,
     basis: Vec<Vec<f64>>,
     mean_square: f64,
+    rss: f64,
 }
 
 impl Bins {
@@ -88,10 +89,15 @@ impl Bins {
             first_s: (0..count).map(|i| here.t[i * rows_of_bin] - here.origin_s).collect(),
             residual: vec![0.0; count],
             basis: vec![],
+            rss: found.rss(),
             mean_square: found.rss() / here.kept().max(1) as f64,
         };
         blocks(here, shape, &found.points, linear, |segment, first, block| {
-            let slopes = derivatives(shape, &linear.shared, &linear.local[segment]);
+            let slopes = if shape.differentiable {
+                derivatives(shape, &linear.shared, &linear.local[segment])
+            } else {
+                vec![]
+            };
             let single = |column: usize| vec![(1.0, column)];
             let shared = shape.shared.iter().map(|t| single(t.column)).chain(slopes).enumerate();
             let start = shape.shared.len() + shape.unknowns + locals * segment;
@@ -125,7 +131,6 @@ impl Bins {
     /// The best places for a step of some dynamics.
     fn best(&self, order: Order, dynamics: Point) -> Vec<Candidate> {
         let count = self.weight.len();
-        let width_s = (self.first_s[count - 1] - self.first_s[0]) / (count - 1).max(1) as f64;
         let mut scores: Vec<(f64, usize)> =
             (1..count).map(|at| (self.score(order, dynamics, at), at)).collect();
         scores.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -138,7 +143,8 @@ impl Bins {
             if out.iter().all(|other| other.abs_diff(at) >= APART) {
                 out.push(at);
                 let point = Point { dead_time_s: self.first_s[at], ..dynamics };
-                found.push(Candidate { order, point, score, width_s });
+                let left = self.rss - score * self.mean_square;
+                found.push(Candidate { order, point, score, left });
             }
         }
         found
