@@ -142,7 +142,7 @@ pub(super) fn rank(fits: Vec<ModelFit>, stretch: &Stretch) -> Choice {
 ///
 /// Each leaves out what its own dead time cannot explain at the start; one that takes a slow beginning for a dead time would
 /// leave out what speaks against it. Compared are the rows that half of them explain.
-pub(super) fn mean_squares(fits: &[ModelFit], stretch: &Stretch) -> Vec<f64> {
+fn mean_squares(fits: &[ModelFit], stretch: &Stretch) -> Vec<f64> {
     let mut reaches: Vec<f64> = fits.iter().map(|f| f.reach_s).collect();
     reaches.sort_by(f64::total_cmp);
     let typical = reaches.get(reaches.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);

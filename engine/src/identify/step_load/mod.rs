@@ -11,13 +11,14 @@ mod noise;
 mod scan;
 mod start;
 
-use super::choose::{Choice, mean_squares, rank};
-use super::fit_structure::{profile_dead_times, reaches_s, report, shape_like};
+use super::choose::{Choice, rank};
+use super::fit_structure::{free_run, profile_dead_times, reaches_s, report, shape_like};
 use super::judge;
 use super::known::settled;
 use super::model_fit::ModelFit;
 use super::output_error::{Found, Linear, Order, Point, Shape, Work, again, evaluate, refine};
 use super::problem::{FitProblem, Stretch};
+use super::residual_tests::ResidualTests;
 use scan::{BINS, candidates};
 
 /// Most loads of a stretch.
@@ -70,17 +71,35 @@ fn is_exact(fit: &ModelFit) -> bool {
 /// coloured noise beside it; the lesser of the two.
 fn gained(from: &ModelFit, to: &ModelFit, stretch: &Stretch) -> f64 {
     let added = to.unknowns as f64 - from.unknowns as f64;
-    let n = independent_rows(to);
-    let pair = [from.clone(), to.clone()];
-    let squares = mean_squares(&pair, stretch);
-    let by_rows = n * (squares[0] / squares[1]).ln() - added * n.ln();
-    let counted = |fit: &ModelFit, row: usize| fit.residuals[row] != 0.0;
-    let both: Vec<usize> =
-        (0..from.residuals.len()).filter(|&row| counted(from, row) && counted(to, row)).collect();
-    let [without, with] =
-        [from, to].map(|fit| both.iter().map(|&row| fit.residuals[row]).collect::<Vec<f64>>());
-    let rows = both.len().max(10) as f64;
+    let [without, with] = residuals_of(from, to, stretch);
+    let (n, rows) = (independent_rows(to), with.len().max(10) as f64);
+    let by_rows = n * (power(&without) / power(&with)).ln() - added * n.ln();
     by_rows.min(noise::likelihood_ratio(&without, &with) - added * rows.ln())
+}
+
+/// Twice the logarithm of the likelihood ratio of two fits, as if rows were independent.
+fn ratio(from: &ModelFit, to: &ModelFit, stretch: &Stretch) -> f64 {
+    let [without, with] = residuals_of(from, to, stretch);
+    with.len() as f64 * (power(&without) / power(&with)).ln()
+}
+
+fn power(residuals: &[f64]) -> f64 {
+    residuals.iter().map(|r| r * r).sum::<f64>().max(f64::MIN_POSITIVE)
+}
+
+/// Residuals of two fits on the rows that the one of the shorter dead time explains: a fit that leaves more out leaves out
+/// what speaks against it.
+fn residuals_of(a: &ModelFit, b: &ModelFit, stretch: &Stretch) -> [Vec<f64>; 2] {
+    let common = stretch.known_after(a.reach_s.min(b.reach_s)).unwrap_or_else(|| stretch.clone());
+    let kept: Vec<usize> = common.kept_rows().collect();
+    [a, b].map(|fit| {
+        let shape = shape_like(&common, fit).without_derivatives();
+        let at = evaluate(&common, &shape, fit.points(), &Linear::zero(&shape, &common));
+        at.map_or_else(Vec::new, |at| {
+            let residuals = free_run(&common, &shape, &at).1;
+            kept.iter().map(|&row| residuals[row]).collect()
+        })
+    })
 }
 
 fn independent_rows(fit: &ModelFit) -> f64 {
@@ -108,7 +127,7 @@ fn with_loads(problem: &FitProblem, stretch: &Stretch, plain: &ModelFit, simpler
     while nested.len() <= MOST {
         let last = &nested[nested.len() - 1];
         let Some(next) = with_another(problem, stretch, last, simpler) else { break };
-        if next.rows as f64 * (last.mse / next.mse).ln() < HINT {
+        if ratio(last, &next, stretch) < HINT {
             break;
         }
         nested.push(next);
@@ -129,7 +148,11 @@ fn with_another(
     fit: &ModelFit,
     simpler: &[ModelFit],
 ) -> Option<ModelFit> {
-    let here = known(stretch, fit);
+    /// Part of the rows that a fit must count to be a guide: a dead time that leaves most of them out explains little.
+    const GUIDE: f64 = 0.8;
+    let known = known(stretch, fit);
+    let is_guide = known.kept() as f64 > GUIDE * stretch.kept() as f64;
+    let here = if is_guide { known } else { stretch.clone() };
     let shape = shape_like(&here, fit);
     let at = evaluate(&here, &shape, fit.points(), &Linear::zero(&shape, &here))?;
     let (shape, best) = best_of(&here, &shape, &at, simpler)?;
@@ -147,34 +170,72 @@ fn with_another(
 fn best_of(here: &Stretch, shape: &Shape, at: &Found, simpler: &[ModelFit]) -> Option<(Shape, Found)> {
     let thin = (here.len() > 2 * ROWS).then(|| here.thinned(here.len() / ROWS));
     let short = thin.as_ref().unwrap_or(here);
-    let rows = short.kept() as f64;
-    let width_s = here.span_s() / BINS as f64;
-    let mut best: Option<(f64, Order, Found)> = None;
     let hinted = candidates(here, shape, at).into_iter().filter(|c| c.score > HINT);
-    let mut starts: Vec<(Order, Vec<Point>)> =
-        hinted.map(|c| (c.order, [&at.points[..], &[c.point]].concat())).collect();
+    let starts = hinted.map(|c| (c.order, [&at.points[..], &[c.point]].concat())).collect();
+    let mut best = lowest(short, shape, starts);
     // A load as large as the moves of the MV has led the fit without it astray.
-    if shape.loads == 0 {
-        starts.extend(start::starts(here, shape, &at.points, simpler));
-    }
-    for (order, points) in starts {
-        let wider = with_load(shape, order);
-        let Some(found) = refine(short, &wider, &points, PASSES, &mut 0) else { continue };
-        // A lag shorter than a row is a jump between two rows, and has no time of its own.
-        let load = found.points[found.points.len() - 1];
-        if order != Order::Jump && load.time_s < 0.5 * short.sample_time_s {
-            continue;
-        }
-        let criterion = rows * found.rss().ln() + wider.parameters(short) as f64 * rows.ln();
-        if best.as_ref().is_none_or(|b| criterion < b.0) {
-            best = Some((criterion, order, found));
-        }
+    let leaves_more = |(_, order, found): &Start| !leaves_noise(short, &with_load(shape, *order), found);
+    if shape.loads == 0 && best.as_ref().is_none_or(leaves_more) {
+        let other = lowest(short, shape, start::starts(here, shape, &at.points, simpler));
+        best = [best, other].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
     }
     let (_, order, found) = best?;
     let wider = with_load(shape, order);
     let found = refine(here, &wider, &found.points, 3 * PASSES, &mut 0)?;
-    let jumps = order == Order::Jump;
-    Some((wider.clone(), if jumps { at_the_best_row(here, &wider, found, width_s) } else { found }))
+    let (_, order, found) = as_a_jump(here, shape, (criterion(here, &wider, &found), order, found));
+    Some((with_load(shape, order), found))
+}
+
+/// A load with its process, and its criterion.
+type Start = (f64, Order, Found);
+
+/// Schwarz's, as if rows were independent.
+fn criterion(here: &Stretch, shape: &Shape, found: &Found) -> f64 {
+    let rows = here.kept() as f64;
+    rows * found.rss().max(f64::MIN_POSITIVE).ln() + shape.parameters(here) as f64 * rows.ln()
+}
+
+/// The best of some starts, each descended from.
+fn lowest(short: &Stretch, shape: &Shape, starts: Vec<(Order, Vec<Point>)>) -> Option<Start> {
+    let one = |(order, points): (Order, Vec<Point>)| {
+        let wider = with_load(shape, order);
+        let found = refine(short, &wider, &points, PASSES, &mut 0)?;
+        Some(as_a_jump(short, shape, (criterion(short, &wider, &found), order, found)))
+    };
+    starts.into_iter().filter_map(one).min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// A load that is there at once, at its best row; one with a lag of few rows where it is better so. A lag shorter than a
+/// row is a jump between two rows, and has no time of its own.
+fn as_a_jump(here: &Stretch, shape: &Shape, start: Start) -> Start {
+    const SHORTEST: f64 = 0.7;
+    const SHORT: f64 = 4.0;
+    let (_, order, found) = &start;
+    let load = found.points[found.points.len() - 1];
+    let rows_long = load.time_s / here.sample_time_s;
+    if !matches!(order, Order::Jump | Order::First) || (*order == Order::First && rows_long > SHORT) {
+        return start;
+    }
+    let wider = with_load(shape, Order::Jump);
+    let width_s =
+        if *order == Order::Jump { here.span_s() / BINS as f64 } else { SHORT * here.sample_time_s };
+    let mut points = found.points.clone();
+    let last = points.len() - 1;
+    points[last].dead_time_s = on_a_row(here, load.dead_time_s + 0.5 * here.sample_time_s);
+    let Some(jump) = refine(here, &wider, &points, PASSES, &mut 0) else { return start };
+    let jump = at_the_best_row(here, &wider, jump, width_s);
+    let value = criterion(here, &wider, &jump);
+    if *order == Order::Jump || rows_long < SHORTEST || value < start.0 {
+        return (value, Order::Jump, jump);
+    }
+    start
+}
+
+/// Whether residuals are white.
+fn leaves_noise(short: &Stretch, shape: &Shape, found: &Found) -> bool {
+    let (_, mut residuals) = free_run(short, shape, found);
+    residuals.drain(..short.history.min(residuals.len()));
+    ResidualTests::new(&residuals, &short.u[short.u.len() - residuals.len()..]).is_white()
 }
 
 fn with_load(shape: &Shape, order: Order) -> Shape {

@@ -6,47 +6,51 @@ use crate::identify::output_error::{Linear, Order, Point, Shape, evaluate};
 use crate::identify::problem::Stretch;
 
 /// Rows of the copy on which the dynamics of the process are scanned.
-const ROWS: usize = 300;
+const ROWS: usize = 130;
 /// Starts taken.
-const STARTS: usize = 4;
+const STARTS: usize = 8;
 
-/// Loads with the points they start with: for a process of first order or integrating from a scan over its dynamics, for
-/// one of second order from what simpler structures have found.
+/// Loads with the points they start with, from a scan over the dynamics of the process. One of second order starts near
+/// what simpler structures have found, or near a scan with a first order in its place.
 pub(super) fn starts(
     here: &Stretch,
     shape: &Shape,
     points: &[Point],
     simpler: &[ModelFit],
 ) -> Vec<(Order, Vec<Point>)> {
-    match shape.channels[0] {
-        Order::Second { .. } => near_simpler(shape, points, simpler),
-        _ => scanned(here, shape, points),
+    if !matches!(shape.channels[0], Order::Second { .. }) {
+        return scanned(here, shape, points);
     }
+    let found: Vec<(Order, Vec<Point>)> = simpler
+        .iter()
+        .filter(|fit| fit.loads.len() == 1 && fit.parameter("T_s").is_some())
+        .map(|fit| (fit.loads[0].order, fit.points()))
+        .collect();
+    if !found.is_empty() {
+        return second_orders(shape, &found);
+    }
+    let mut channels = shape.channels.clone();
+    channels[0] = Order::First;
+    let first = Shape::new(channels, shape.drift, shape.free);
+    second_orders(shape, &scanned(here, &first, points))
 }
 
-/// Second orders near the loaded fits of the others.
-fn near_simpler(shape: &Shape, points: &[Point], simpler: &[ModelFit]) -> Vec<(Order, Vec<Point>)> {
+/// Second orders near first ones, with loads behind a first order and, as at the process's input, behind both lags.
+fn second_orders(shape: &Shape, found: &[(Order, Vec<Point>)]) -> Vec<(Order, Vec<Point>)> {
+    /// τ and L as parts of T and L of a first order, and ζ.
+    const NEAR: [(f64, f64, f64); 3] = [(0.45, 0.6, 1.1), (0.3, 0.8, 2.0), (0.5, 0.6, 0.5)];
+    let twice = Order::Second { zero: false };
     let mut out = vec![];
-    for fit in simpler.iter().filter(|fit| fit.loads.len() == 1 && fit.points().len() == points.len() + 1) {
-        let mut with = fit.points();
-        let main = with[0];
-        let load = &fit.loads[0];
-        if fit.parameter("Kv").is_some() {
-            continue;
-        }
-        let second = fit.parameter("T2_s").is_some() || fit.parameter("zeta").is_some();
-        let shares: &[(f64, f64)] =
-            if second { &[(1.0, main.zeta)] } else { &[(0.5, 1.0), (0.3, 2.0), (0.4, 0.5)] };
-        for (share, zeta) in shares {
-            let (time_s, dead_time_s) =
-                (share * main.time_s, if second { 1.0 } else { 0.6 } * main.dead_time_s);
-            with[0] = Point { time_s, zeta: *zeta, dead_time_s };
-            out.push((load.order, with.clone()));
-            if load.order == Order::First && shape.channels[0] == (Order::Second { zero: false }) {
-                let mut alike = with.clone();
-                let last = alike.len() - 1;
-                (alike[last].time_s, alike[last].zeta) = (time_s, *zeta);
-                out.push((Order::Second { zero: false }, alike));
+    for (order, points) in found {
+        let main = points[0];
+        for (tau, lag, zeta) in NEAR {
+            let mut with = points.clone();
+            with[0] = Point { time_s: tau * main.time_s, zeta, dead_time_s: lag * main.dead_time_s };
+            out.push((*order, with.clone()));
+            if *order == Order::First && shape.channels[0] == twice {
+                let load = with.len() - 1;
+                with[load] = Point { dead_time_s: with[load].dead_time_s, ..with[0] };
+                out.push((twice, with));
             }
         }
     }
