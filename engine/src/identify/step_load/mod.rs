@@ -11,6 +11,7 @@ mod noise;
 mod scan;
 mod start;
 
+use super::FitVerdict;
 use super::choose::{Choice, rank};
 use super::fit_structure::{free_run, profile_dead_times, reaches_s, report, shape_like};
 use super::judge;
@@ -163,7 +164,24 @@ fn with_another(
     profile_dead_times(&here, &shape, &found, None, &mut with, &mut work);
     (with.passes, with.thinned_passes) = (fit.passes + work.passes, fit.thinned_passes);
     with.verdicts = judge::of_model(&with, &here, problem);
+    say_where_it_hides_the_gain(&mut with, fit);
     Some(with)
+}
+
+/// Where a load leaves the gain far less known, for the noise there is, than the fit without it would have it, the two
+/// came together.
+fn say_where_it_hides_the_gain(with: &mut ModelFit, without: &ModelFit) {
+    /// Ratio of the gain's errors for the same noise.
+    const HIDDEN: f64 = 4.0;
+    let noise = |fit: &ModelFit| (fit.mse * fit.tests.rows_per_independent).sqrt();
+    let error = |fit: &ModelFit| fit.parameters[0].standard_error / noise(fit);
+    if let Some(load) = with.loads.last()
+        && error(with) > HIDDEN * error(without)
+    {
+        let verdict = FitVerdict::LoadWithMv { at_s: load.at_s };
+        with.verdicts.retain(|verdict| !matches!(verdict, FitVerdict::Good { .. }));
+        with.verdicts.insert(0, verdict);
+    }
 }
 
 /// The most promising step and lag, descended to together with the process.
