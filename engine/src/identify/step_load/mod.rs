@@ -4,8 +4,8 @@
 //! K_d H(t − t_d)/s. A fit without it spreads the change over gain, dynamics and offset, and its intervals miss the truth.
 //! The time is searched by the score of a step at every place, gain and lag are descended to together with the process, so
 //! that its intervals hold what the load leaves open. Up to [`MOST`] are taken one after the other, each where Schwarz's
-//! criterion, over independent rows only, speaks for it very strongly: the search over the time alone makes a likelihood
-//! ratio of 12 out of chance once in a hundred records (Andrews, Econometrica 61 (1993) 821), well below.
+//! criterion, over independent rows only, speaks for it very strongly, and told only where noise is all that is left: the
+//! search over the time alone makes a likelihood ratio of 12 out of chance once in a hundred records (Andrews, Econometrica 61 (1993) 821), well below.
 
 mod noise;
 mod scan;
@@ -57,10 +57,18 @@ pub(super) fn with_loads_where_due(
     }
     let choice = rank(loaded, stretch);
     let (with, without) = (choice.chosen(), drifting.chosen());
-    if with.loads.is_empty() || gained(without, with, stretch) < VERY_STRONG {
+    if with.loads.is_empty() || !is_complete(with) || gained(without, with, stretch) < VERY_STRONG {
         return drifting;
     }
     choice
+}
+
+/// Whether a fit leaves nothing but noise. A process with more in it than its structure, one that is not linear or that
+/// wanders, also looks as if something had moved it here and there; but then steps leave a pattern of their own.
+fn is_complete(fit: &ModelFit) -> bool {
+    /// Probability below which white residuals would be too unlikely.
+    const WHITE: f64 = 1e-3;
+    fit.tests.white_probability > WHITE && !fit.tests.follows_input()
 }
 
 /// A fit to the last digits leaves rounding, whatever its pattern.
