@@ -10,7 +10,8 @@ mod records;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use vasos_engine::identify::{
-    Choice, FitProblem, FitVerdict, Loads, ModelFit, Structure, choose_model, fit_model,
+    Choice, FitProblem, FitVerdict, Loads, LoopRecord, ModelFit, Structure, StudyOptions, choose_model,
+    fit_model, study_loop,
 };
 
 use records::{moves, noise, share_of};
@@ -321,5 +322,94 @@ fn a_choice_tells_the_load_and_keeps_the_structure() {
                 assert!((at_s - 320.0).abs() < 12.0 && (change - 1.2).abs() < 0.2, "{at_s} {change}");
             }
         }
+    }
+}
+
+/// What a study says of a record.
+fn said(time_s: &[f64], pv: &[f64], mv: &[f64]) -> Vec<FitVerdict> {
+    let record = LoopRecord { problem: FitProblem::new(time_s, pv, mv), sp: None, mode: None };
+    let study = study_loop(&record, &StudyOptions::default()).expect("a study");
+    study.choice.expect("a choice").chosen().verdicts.clone()
+}
+
+/// Three moves between three levels, y∞ = 2 u + square · u², T = 30 s, L = 5 s, noise of sd 0.05.
+fn bent(square: f64, seed: u64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let e = noise(&mut StdRng::seed_from_u64(seed), 1200, 0.0);
+    let time_s: Vec<f64> = (0..1200).map(f64::from).collect();
+    let mv = moves(&time_s, &[(100.0, 15.0), (400.0, 20.0), (700.0, 10.0)], 10.0);
+    let rest = |u: f64| 2.0 * u + square * u * u;
+    let (mut y, a) = (rest(10.0), f64::exp(-1.0 / 30.0));
+    let pv = (0..1200)
+        .map(|k| {
+            let now = y + 0.05 * e[k];
+            y = a * y + (1.0 - a) * rest(mv[k.saturating_sub(5)]);
+            now
+        })
+        .collect();
+    (time_s, pv, mv)
+}
+
+/// y∞ = 2 u + 0.1 u² has the slope 2 + 0.2 u: 4 at 10 and 6 at 20. Steps at the moves would explain it as well.
+#[test]
+fn a_gain_that_changes_with_the_level_of_the_mv_is_told() {
+    for seed in 0..5 {
+        let (time_s, pv, mv) = bent(0.1, seed);
+        let found = said(&time_s, &pv, &mv);
+        let Some(FitVerdict::GainByLevel { levels, gains }) = found.first() else { panic!("{found:?}") };
+        assert_eq!(*levels, [10.0, 20.0]);
+        assert!((gains[0] - 4.0).abs() < 0.05 && (gains[1] - 6.0).abs() < 0.05, "{gains:?}");
+        for straight in [0.0, 0.005] {
+            let (time_s, pv, mv) = bent(straight, seed);
+            let found = said(&time_s, &pv, &mv);
+            // A twentieth from end to end leaves a pattern in this little noise, but nothing that came unmeasured.
+            let good = matches!(found[0], FitVerdict::Good { .. });
+            assert_eq!(good, straight == 0.0, "{straight}: {found:?}");
+            assert!(!found.iter().any(|v| matches!(v, FitVerdict::Load { .. })), "{straight}: {found:?}");
+        }
+    }
+}
+
+/// A first order whose sign or loop lets it run away: the last rows fitted to the last digit passed for a good model.
+#[test]
+fn a_record_that_runs_away_is_not_called_good() {
+    for (pole, kc) in [(-1.0 / 30.0, 6.0), (-1.0 / 30.0, 8.0), (1.0 / 30.0, 0.0)] {
+        for sd in [0.0, 0.05] {
+            let e = noise(&mut StdRng::seed_from_u64(7), 300, 0.0);
+            let time_s: Vec<f64> = (0..300).map(f64::from).collect();
+            let (a, mut y, mut sum) = (f64::exp(pole), 0.0, 0.0);
+            let (mut pv, mut mv) = (vec![], vec![]);
+            for k in 0..300 {
+                let (now, sp) = (y + sd * e[k], f64::from(u8::from(k > 20)));
+                let error = sp - now;
+                sum += kc * error / 30.0;
+                pv.push(now);
+                mv.push(if kc > 0.0 { kc * error + sum } else { sp });
+                y = a * y + 2.0 * (1.0 - a).abs() * if k >= 5 { mv[k - 5] } else { 0.0 };
+            }
+            let found = said(&time_s, &pv, &mv);
+            assert!(
+                !found.iter().any(|v| matches!(v, FitVerdict::Good { .. })),
+                "{pole} {kc} {sd}: {found:?}"
+            );
+        }
+    }
+}
+
+/// A load that runs up under a loop whose setpoint nobody knows, L = 0, no noise: the controller's answer is no model.
+#[test]
+fn a_ramp_of_a_load_under_feedback_gives_no_model() {
+    for dead_rows in [0, 1] {
+        let time_s: Vec<f64> = (0..600).map(f64::from).collect();
+        let (a, mut y, mut sum) = (f64::exp(-1.0 / 30.0), 0.0, 0.0);
+        let (mut pv, mut mv) = (vec![], vec![]);
+        for k in 0..600 {
+            let now = y + 0.01 * k as f64;
+            sum -= 0.8 * now / 30.0;
+            pv.push(now);
+            mv.push(sum - 0.8 * now);
+            y = a * y + 2.0 * (1.0 - a) * if k >= dead_rows { mv[k - dead_rows] } else { 0.0 };
+        }
+        let found = said(&time_s, &pv, &mv);
+        assert!(found.iter().any(FitVerdict::is_refusal), "{dead_rows}: {found:?}");
     }
 }

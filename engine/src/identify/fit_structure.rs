@@ -140,8 +140,7 @@ pub(super) fn profile_dead_times(
     fit: &mut ModelFit,
     work: &mut Work,
 ) {
-    let freedom = fit.rows.saturating_sub(fit.unknowns).max(1) as f64;
-    let variance = fit.mse * fit.rows as f64 / freedom * fit.tests.rows_per_independent;
+    let variance = fit.mse * fit.rows as f64 / freedom(fit.rows, fit.unknowns, &fit.tests);
     let white = fit.tests.rows_per_independent <= 1.0;
     let student = fit.student;
     let main = std::iter::once(&mut fit.parameters);
@@ -193,10 +192,10 @@ pub(super) fn report(
     let rss: f64 = residuals.iter().map(|r| r * r).sum();
     let movement: f64 = stretch.kept_rows().map(|k| (stretch.y[k] - stretch.y_ref).powi(2)).sum();
     let unknowns = shape.parameters(stretch);
-    let freedom = rows.saturating_sub(unknowns).max(1);
     let tests = ResidualTests::new(&residuals, &stretch.u[stretch.history..]);
-    let student = student_95(freedom);
-    let variance = rss / freedom as f64 * tests.rows_per_independent;
+    let freedom = freedom(rows, unknowns, &tests);
+    let student = student_95(freedom as usize);
+    let variance = rss / freedom;
     let whole = found.projected.matrix.inverse();
     let coordinates = |channel: usize, structure: Structure| {
         let places = places(shape, channel);
@@ -253,6 +252,19 @@ pub(super) fn report(
         reach_s: reaches_s(stretch, shape, found)[0],
         known_from: (0..stretch.segments.len()).map(|s| stretch.known(s).start - stretch.history).collect(),
     })
+}
+
+/// Independent rows beyond the unknowns: where few rows are independent, what is left over tells little of their noise, and
+/// its correlation comes out too small.
+fn freedom(rows: usize, unknowns: usize, tests: &ResidualTests) -> f64 {
+    /// As few as Student's t still has a use for.
+    const LEAST: f64 = 3.0;
+    let spare = |independent: f64, least: f64| (independent - unknowns as f64).max(least);
+    if tests.rows_per_independent > 1.0 {
+        spare(rows as f64 / tests.rows_per_independent, LEAST)
+    } else {
+        spare(rows as f64, 1.0)
+    }
 }
 
 /// The loads of a fit with their intervals.

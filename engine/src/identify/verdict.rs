@@ -136,6 +136,18 @@ pub enum FitVerdict {
         /// What it adds to the rate, in PV units per hour.
         per_hour: f64,
     },
+    /// The gain changes with the level of the MV.
+    GainByLevel {
+        /// Lowest and highest MV, in MV units.
+        levels: [f64; 2],
+        /// Gain there.
+        gains: [f64; 2],
+    },
+    /// The PV runs away.
+    Diverges {
+        /// How much farther the PV moves in the last eighth of the stretch than in the fourth.
+        times: f64,
+    },
     /// What came unmeasured came with a move of the MV.
     LoadWithMv {
         /// When, in seconds of the record.
@@ -235,6 +247,19 @@ impl std::fmt::Display for FitVerdict {
                 n(*at_s),
                 n(*per_hour)
             ),
+            Self::GainByLevel { levels, gains } => write!(
+                f,
+                "the gain changes with the MV: about {} at {}, about {} at {}; one linear model holds between them only on average, fit a stretch near the level at which the loop runs",
+                n(gains[0]),
+                n(levels[0]),
+                n(gains[1]),
+                n(levels[1])
+            ),
+            Self::Diverges { times } => write!(
+                f,
+                "the PV runs away: in the last eighth of the stretch it moves {} times as far as in the fourth, so that the last rows outweigh all others and the intervals are those of a model that holds however far it goes; choose a stretch that ends earlier",
+                n(*times)
+            ),
             Self::LoadWithMv { at_s } => write!(
                 f,
                 "something unmeasured moved the process at t = {} s together with the MV: which of the two did what, this stretch hardly tells; move the MV once more on its own",
@@ -275,6 +300,8 @@ impl Explain for FitVerdict {
             Self::Drift { .. } => "verdict.drift",
             Self::Load { .. } => "verdict.load",
             Self::LoadRate { .. } => "verdict.load_rate",
+            Self::GainByLevel { .. } => "verdict.gain_by_level",
+            Self::Diverges { .. } => "verdict.diverges",
             Self::LoadWithMv { .. } => "verdict.load_with_mv",
             Self::Segments { .. } => "verdict.segments",
             Self::StartsAtRest { .. } => "verdict.starts_at_rest",
@@ -327,6 +354,13 @@ impl Explain for FitVerdict {
             Self::Drift { per_hour } => vec![n("per_hour", per_hour)],
             Self::Load { at_s, change } => vec![n("at_s", at_s), n("change", change)],
             Self::LoadRate { at_s, per_hour } => vec![n("at_s", at_s), n("per_hour", per_hour)],
+            Self::GainByLevel { levels, gains } => vec![
+                n("low", &levels[0]),
+                n("high", &levels[1]),
+                n("gain_low", &gains[0]),
+                n("gain_high", &gains[1]),
+            ],
+            Self::Diverges { times } => vec![n("times", times)],
             Self::LoadWithMv { at_s } => vec![n("at_s", at_s)],
             Self::Segments { count } => vec![("count", count.to_string())],
             Self::StartsAtRest { mv_before } => vec![n("mv_before", mv_before)],
@@ -430,6 +464,8 @@ impl FitVerdict {
             Self::Load { at_s: 420.0, change: -3.2 },
             Self::LoadRate { at_s: 420.0, per_hour: 1.8 },
             Self::LoadWithMv { at_s: 420.0 },
+            Self::GainByLevel { levels: [10.0, 20.0], gains: [2.0, 4.0] },
+            Self::Diverges { times: 340.0 },
             Self::Segments { count: 3 },
             Self::StartsAtRest { mv_before: 0.0 },
         ]

@@ -7,6 +7,7 @@
 //! criterion, over independent rows only, speaks for it very strongly, and told only where noise is all that is left: the
 //! search over the time alone makes a likelihood ratio of 12 out of chance once in a hundred records (Andrews, Econometrica 61 (1993) 821), well below.
 
+mod level;
 mod noise;
 mod scan;
 mod start;
@@ -20,6 +21,7 @@ use super::model_fit::ModelFit;
 use super::output_error::{Found, Linear, Order, Point, Shape, Work, again, evaluate, refine};
 use super::problem::{FitProblem, Stretch};
 use super::residual_tests::ResidualTests;
+use level::Level;
 use scan::{BINS, candidates};
 
 /// Most loads of a stretch.
@@ -44,6 +46,11 @@ pub(super) fn with_loads_where_due(
     if is_exact(chosen) || !hints(stretch, chosen) {
         return drifting;
     }
+    let level = level_of(stretch, chosen);
+    let otherwise = match &level {
+        Some(level) if level.is_worth_a_word => with_level(drifting, level),
+        _ => drifting,
+    };
     let mut loaded: Vec<ModelFit> = vec![];
     // A second order starts where a first one has found its load.
     let mut simplest_first: Vec<&ModelFit> = plain.fits.iter().collect();
@@ -53,12 +60,22 @@ pub(super) fn with_loads_where_due(
         loaded.push(with);
     }
     if loaded.iter().all(|fit| fit.loads.is_empty()) {
-        return drifting;
+        return otherwise;
     }
     let choice = rank(loaded, stretch);
-    let (with, without) = (choice.chosen(), drifting.chosen());
+    let (with, without) = (choice.chosen(), otherwise.chosen());
     if with.loads.is_empty() || !is_complete(with) || gained(without, with, stretch) < VERY_STRONG {
-        return drifting;
+        return otherwise;
+    }
+    // Steps at the moves of the MV mend what a gain that changes with its level breaks.
+    if let Some(level) = level {
+        let [loaded, _] = residuals_of(with, chosen, stretch);
+        let rows = loaded.len() as f64;
+        let ratio = rows * (power(&level.rival.residuals) / power(&loaded)).ln();
+        let fewer = with.unknowns as f64 - level.rival.unknowns as f64;
+        if loaded.len() == level.rival.residuals.len() && ratio < fewer * rows.ln() {
+            return otherwise;
+        }
     }
     choice
 }
@@ -76,14 +93,56 @@ fn is_exact(fit: &ModelFit) -> bool {
     fit.fit_percent > 99.9999
 }
 
-/// How much Schwarz's criterion falls from one fit to another: over the rows that are independent in the other, and with
-/// coloured noise beside it; the lesser of the two.
-fn gained(from: &ModelFit, to: &ModelFit, stretch: &Stretch) -> f64 {
+/// What an explanation leaves over, and what it takes.
+#[derive(Debug, Clone)]
+struct Rival {
+    residuals: Vec<f64>,
+    unknowns: usize,
+}
+
+impl Rival {
+    fn tests(&self) -> ResidualTests {
+        ResidualTests::new(&self.residuals, &vec![0.0; self.residuals.len()])
+    }
+}
+
+/// How much Schwarz's criterion falls from one explanation to another of the same rows: over the rows that are independent
+/// in the other, and with coloured noise beside it; the lesser of the two.
+fn fall(from: &Rival, to: &Rival) -> f64 {
     let added = to.unknowns as f64 - from.unknowns as f64;
+    let rows = to.residuals.len().max(10) as f64;
+    let n = (rows / to.tests().rows_per_independent).max(10.0);
+    let by_rows = n * (power(&from.residuals) / power(&to.residuals)).ln() - added * n.ln();
+    by_rows.min(noise::likelihood_ratio(&from.residuals, &to.residuals) - added * rows.ln())
+}
+
+fn gained(from: &ModelFit, to: &ModelFit, stretch: &Stretch) -> f64 {
     let [without, with] = residuals_of(from, to, stretch);
-    let (n, rows) = (independent_rows(to), with.len().max(10) as f64);
-    let by_rows = n * (power(&without) / power(&with)).ln() - added * n.ln();
-    by_rows.min(noise::likelihood_ratio(&without, &with) - added * rows.ln())
+    let from = Rival { residuals: without, unknowns: from.unknowns };
+    fall(&from, &Rival { residuals: with, unknowns: to.unknowns })
+}
+
+/// The gain at the ends of the MV's range, where it changes with the level beyond doubt.
+fn level_of(stretch: &Stretch, fit: &ModelFit) -> Option<Level> {
+    /// The squared residual must fall to this part: what matters less is a matter of the structure.
+    const FALL: f64 = 0.7;
+    let level = level::look(stretch, fit)?;
+    let [straight, _] = residuals_of(fit, fit, stretch);
+    let straight = Rival { residuals: straight, unknowns: fit.unknowns };
+    let explains = power(&level.rival.residuals) < FALL * power(&straight.residuals);
+    (straight.residuals.len() == level.rival.residuals.len()
+        && explains
+        && fall(&straight, &level.rival) > VERY_STRONG)
+        .then_some(level)
+}
+
+/// The choice with what was found of the gain.
+fn with_level(mut choice: Choice, level: &Level) -> Choice {
+    let verdict = FitVerdict::GainByLevel { levels: level.levels, gains: level.gains };
+    let fit = &mut choice.fits[0];
+    fit.verdicts.retain(|verdict| !matches!(verdict, FitVerdict::Good { .. }));
+    fit.verdicts.insert(0, verdict);
+    choice
 }
 
 /// Twice the logarithm of the likelihood ratio of two fits, as if rows were independent.
@@ -109,10 +168,6 @@ fn residuals_of(a: &ModelFit, b: &ModelFit, stretch: &Stretch) -> [Vec<f64>; 2] 
             kept.iter().map(|&row| residuals[row]).collect()
         })
     })
-}
-
-fn independent_rows(fit: &ModelFit) -> f64 {
-    (fit.rows as f64 / fit.tests.rows_per_independent).max(10.0)
 }
 
 /// The rows that a fit counted.
