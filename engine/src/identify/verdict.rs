@@ -235,36 +235,11 @@ impl std::fmt::Display for FitVerdict {
             Self::Drift { per_hour } => {
                 write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
             }
-            Self::Load { at_s, change } => write!(
-                f,
-                "the process was moved by something unmeasured at t = {} s: it adds {} to the PV and was fitted along",
-                n(*at_s),
-                n(*change)
-            ),
-            Self::LoadRate { at_s, per_hour } => write!(
-                f,
-                "the process was moved by something unmeasured at t = {} s: from there on the PV moves by {} more an hour, which was fitted along",
-                n(*at_s),
-                n(*per_hour)
-            ),
-            Self::GainByLevel { levels, gains } => write!(
-                f,
-                "the gain changes with the MV: about {} at {}, about {} at {}; one linear model holds between them only on average, fit a stretch near the level at which the loop runs",
-                n(gains[0]),
-                n(levels[0]),
-                n(gains[1]),
-                n(levels[1])
-            ),
-            Self::Diverges { times } => write!(
-                f,
-                "the PV runs away: in the last eighth of the stretch it moves {} times as far as in the fourth, so that the last rows outweigh all others and the intervals are those of a model that holds however far it goes; choose a stretch that ends earlier",
-                n(*times)
-            ),
-            Self::LoadWithMv { at_s } => write!(
-                f,
-                "something unmeasured moved the process at t = {} s together with the MV: which of the two did what, this stretch hardly tells; move the MV once more on its own",
-                n(*at_s)
-            ),
+            Self::Load { .. }
+            | Self::LoadRate { .. }
+            | Self::LoadWithMv { .. }
+            | Self::GainByLevel { .. }
+            | Self::Diverges { .. } => self.write_process(f),
             Self::Segments { count } => {
                 write!(f, "the stretch has gaps: fitted as {count} segments, each with its own start")
             }
@@ -406,6 +381,44 @@ impl FitVerdict {
                 "T = {} s is too short for a sample time of {} s: only an upper bound, sample faster",
                 n(*time_constant_s),
                 n(*sample_time_s)
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is said of a process that is more than a linear answer to its MV; nothing for the others.
+    fn write_process(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::Load { at_s, change } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: it adds {} to the PV and was fitted along",
+                n(*at_s),
+                n(*change)
+            ),
+            Self::LoadRate { at_s, per_hour } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: from there on the PV moves by {} more an hour, which was fitted along",
+                n(*at_s),
+                n(*per_hour)
+            ),
+            Self::GainByLevel { levels, gains } => write!(
+                f,
+                "the gain changes with the MV: about {} at {}, about {} at {}; one linear model holds between them only on average, fit a stretch near the level at which the loop runs",
+                n(gains[0]),
+                n(levels[0]),
+                n(gains[1]),
+                n(levels[1])
+            ),
+            Self::Diverges { times } => write!(
+                f,
+                "the PV runs away: in the last eighth of the stretch it moves {} times as far as in the fourth, so that the last rows outweigh all others and the intervals are those of a model that holds however far it goes; choose a stretch that ends earlier",
+                n(*times)
+            ),
+            Self::LoadWithMv { at_s } => write!(
+                f,
+                "something unmeasured moved the process at t = {} s together with the MV: which of the two did what, this stretch hardly tells; move the MV once more on its own",
+                n(*at_s)
             ),
             _ => Ok(()),
         }
