@@ -232,10 +232,8 @@ impl std::fmt::Display for FitVerdict {
                 "what the model leaves over still follows the MV (correlation {} after {lag} rows): the process has more in it than this structure, and the intervals are those of a structure that holds: too narrow",
                 n(*correlation)
             ),
-            Self::Drift { per_hour } => {
-                write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
-            }
-            Self::Load { .. }
+            Self::Drift { .. }
+            | Self::Load { .. }
             | Self::LoadRate { .. }
             | Self::LoadWithMv { .. }
             | Self::GainByLevel { .. }
@@ -390,6 +388,9 @@ impl FitVerdict {
     fn write_process(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let n = number;
         match self {
+            Self::Drift { per_hour } => {
+                write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
+            }
             Self::Load { at_s, change } => write!(
                 f,
                 "the process was moved by something unmeasured at t = {} s: it adds {} to the PV and was fitted along",
