@@ -1,9 +1,10 @@
 //! Which structure a stretch speaks for.
 
-use super::fit_structure::{fit_on, shape_of, with_drift_where_due};
+use super::fit_structure::{fit_on, shape_like, with_drift_where_due};
 use super::model_fit::ModelFit;
 use super::output_error::{Linear, Near, evaluate};
-use super::problem::{Drift, FitProblem, Stretch};
+use super::problem::{Drift, FitProblem, Loads, Stretch};
+use super::step_load::with_loads_where_due;
 use super::{FitError, FitVerdict, Structure};
 
 /// Several structures on one stretch, best first.
@@ -20,6 +21,11 @@ impl Choice {
     #[must_use]
     pub fn of_one(fit: ModelFit) -> Self {
         Self { fits: vec![fit], criterion: vec![0.0] }
+    }
+
+    /// The fit chosen, without the others.
+    pub(super) fn into_chosen(mut self) -> ModelFit {
+        self.fits.swap_remove(0)
     }
 
     /// Says of every fit that the stretch cannot tell a model: nothing else about it matters then.
@@ -88,11 +94,25 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
             Err(error) => first_error = first_error.or(Some(error)),
         }
     }
-    let squares = mean_squares(&fits, &stretch);
-    let Some((best, _)) = fits.iter().zip(&squares).min_by(|a, b| a.1.total_cmp(b.1)) else {
+    if fits.is_empty() {
         return Err(first_error.unwrap_or(FitError::TooFewSamples { rows: stretch.len(), needed: 0 }));
-    };
-    let best = best.tests.rows_per_independent;
+    }
+    let plain = rank(fits, &stretch);
+    let mut drifting = plain.clone();
+    if problem.options.drift == Drift::Auto && plain.chosen().structure != Structure::Ipdt {
+        drifting.fits[0] = with_drift_where_due(problem, &stretch, plain.chosen().clone());
+    }
+    if problem.options.loads == Loads::None {
+        return Ok(drifting);
+    }
+    Ok(with_loads_where_due(problem, &stretch, &plain, drifting))
+}
+
+/// Fits of a stretch, at least one, in the order of the criterion.
+pub(super) fn rank(fits: Vec<ModelFit>, stretch: &Stretch) -> Choice {
+    let squares = mean_squares(&fits, stretch);
+    let best = fits.iter().zip(&squares).min_by(|a, b| a.1.total_cmp(b.1));
+    let best = best.map_or(1.0, |(fit, _)| fit.tests.rows_per_independent);
     let n = (fits[0].rows as f64 / best).max(10.0);
     // Below this the rows are explained to rounding and the criterion would weigh digits.
     let floor =
@@ -115,12 +135,7 @@ pub fn choose_among(problem: &FitProblem, structures: &[Structure]) -> Result<Ch
     }
     let smallest = order.iter().map(|o| o.1).fold(f64::INFINITY, f64::min);
     let criterion = order.iter().map(|o| o.1 - smallest).collect();
-    let mut fits: Vec<ModelFit> = order.into_iter().map(|o| o.2).collect();
-    if problem.options.drift == Drift::Auto && fits[0].structure != Structure::Ipdt {
-        let plain = fits[0].clone();
-        fits[0] = with_drift_where_due(problem, &stretch, plain);
-    }
-    Ok(Choice { fits, criterion })
+    Choice { fits: order.into_iter().map(|o| o.2).collect(), criterion }
 }
 
 /// Mean squared residual of each fit on the same rows, in PV units squared.
@@ -139,7 +154,7 @@ fn mean_squares(fits: &[ModelFit], stretch: &Stretch) -> Vec<f64> {
             {
                 return f.mse;
             }
-            let shape = shape_of(&common, f.structure, f.drift.is_some()).without_derivatives();
+            let shape = shape_like(&common, f).without_derivatives();
             let at = evaluate(&common, &shape, f.points(), &Linear::zero(&shape, &common));
             at.map_or(f64::INFINITY, |at| at.rss() / rows)
         })

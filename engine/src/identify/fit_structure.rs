@@ -3,16 +3,17 @@
 use super::fopdt::{Interval, fit_with_stretch};
 use super::judge;
 use super::known::{reach_s, settled};
-use super::model_fit::{DisturbanceFit, ModelFit};
+use super::model_fit::{DisturbanceFit, LoadFit, ModelFit};
 use super::output_error::{
     Around, Found, Linear, Near, Order, Point, Shape, Symmetric, Work, again, blocks, dead_time_interval,
     evaluate, is_wide, search,
 };
 use super::parameters::{Coordinates, Parameter};
-use super::problem::{Drift, FitProblem, Stretch};
+use super::problem::{Drift, FitProblem, Loads, Stretch};
 use super::residual_tests::ResidualTests;
 use super::statistics::student_95;
-use super::{FitError, Structure};
+use super::step_load::with_loads_where_due;
+use super::{Choice, FitError, Structure};
 
 /// Fits one structure to a stretch by output error.
 ///
@@ -31,10 +32,13 @@ pub fn fit_model(problem: &FitProblem, structure: Structure) -> Result<ModelFit,
     let stretch = problem.stretch()?;
     let with = problem.options.drift == Drift::Linear;
     let plain = fit_on(problem, &stretch, structure, with, &Near::default())?;
-    if problem.options.drift != Drift::Auto || structure == Structure::Ipdt {
-        return Ok(plain);
+    let auto = problem.options.drift == Drift::Auto && structure != Structure::Ipdt;
+    let drifting = if auto { with_drift_where_due(problem, &stretch, plain.clone()) } else { plain.clone() };
+    if problem.options.loads == Loads::None {
+        return Ok(drifting);
     }
-    Ok(with_drift_where_due(problem, &stretch, plain))
+    let (plain, drifting) = (Choice::of_one(plain), Choice::of_one(drifting));
+    Ok(with_loads_where_due(problem, &stretch, &plain, drifting).into_chosen())
 }
 
 /// Adds a drift where it explains far more than its own unknown would by chance.
@@ -112,7 +116,8 @@ pub(super) fn reaches_s(stretch: &Stretch, shape: &Shape, found: &Found) -> [f64
     const LONG: f64 = 0.1;
     let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
     let covariance = found.projected.matrix.inverse();
-    found.points.iter().enumerate().fold([0.0_f64; 2], |farthest, (channel, point)| {
+    let inputs = found.points.iter().take(shape.inputs());
+    inputs.enumerate().fold([0.0_f64; 2], |farthest, (channel, point)| {
         let at = shape.shared.len() + shape.first_unknown(channel) + shape.channels[channel].unknowns() - 1;
         let error =
             covariance.as_ref().map_or(f64::INFINITY, |c| (found.rss() / spare * c.at(at, at)).sqrt());
@@ -127,7 +132,7 @@ pub(super) fn reaches_s(stretch: &Stretch, shape: &Shape, found: &Found) -> [f64
 
 /// Intervals of the dead times by likelihood ratio, where the curvature would not do; `by_short_cut` is that of the
 /// short cut, which holds where the residuals are white and the interval is narrow.
-fn profile_dead_times(
+pub(super) fn profile_dead_times(
     stretch: &Stretch,
     shape: &Shape,
     found: &Found,
@@ -135,8 +140,7 @@ fn profile_dead_times(
     fit: &mut ModelFit,
     work: &mut Work,
 ) {
-    let freedom = fit.rows.saturating_sub(fit.unknowns).max(1) as f64;
-    let variance = fit.mse * fit.rows as f64 / freedom * fit.tests.rows_per_independent;
+    let variance = fit.mse * fit.rows as f64 / freedom(fit.rows, fit.unknowns, &fit.tests);
     let white = fit.tests.rows_per_independent <= 1.0;
     let student = fit.student;
     let main = std::iter::once(&mut fit.parameters);
@@ -150,7 +154,18 @@ fn profile_dead_times(
     }
 }
 
+/// The shape of a fit, on its stretch.
+pub(super) fn shape_like(stretch: &Stretch, fit: &ModelFit) -> Shape {
+    let loads: Vec<Order> = fit.loads.iter().map(|load| load.order).collect();
+    shape_with(stretch, fit.structure, fit.drift.is_some(), &loads)
+}
+
 pub(super) fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> Shape {
+    shape_with(stretch, structure, drift, &[])
+}
+
+/// The shape of a structure with loads besides what was measured.
+pub(super) fn shape_with(stretch: &Stretch, structure: Structure, drift: bool, loads: &[Order]) -> Shape {
     let (main, other) = match structure {
         Structure::Fopdt => (Order::First, Order::First),
         Structure::Ipdt => (Order::Integrator, Order::Integrator),
@@ -159,10 +174,10 @@ pub(super) fn shape_of(stretch: &Stretch, structure: Structure, drift: bool) -> 
     };
     let mut channels = vec![main];
     channels.extend(stretch.others.iter().map(|_| other));
-    Shape::new(channels, drift, stretch.has_free())
+    Shape::with_loads(channels, loads, drift, stretch.has_free())
 }
 
-fn report(
+pub(super) fn report(
     problem: &FitProblem,
     stretch: &Stretch,
     structure: Structure,
@@ -177,10 +192,10 @@ fn report(
     let rss: f64 = residuals.iter().map(|r| r * r).sum();
     let movement: f64 = stretch.kept_rows().map(|k| (stretch.y[k] - stretch.y_ref).powi(2)).sum();
     let unknowns = shape.parameters(stretch);
-    let freedom = rows.saturating_sub(unknowns).max(1);
     let tests = ResidualTests::new(&residuals, &stretch.u[stretch.history..]);
-    let student = student_95(freedom);
-    let variance = rss / freedom as f64 * tests.rows_per_independent;
+    let freedom = freedom(rows, unknowns, &tests);
+    let student = student_95(freedom as usize);
+    let variance = rss / freedom;
     let whole = found.projected.matrix.inverse();
     let coordinates = |channel: usize, structure: Structure| {
         let places = places(shape, channel);
@@ -205,7 +220,7 @@ fn report(
     });
     let gain = linear.shared[shape.gains[0]];
     let centred: f64 =
-        (0..shape.channels.len()).map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference).sum();
+        (0..shape.inputs()).map(|i| linear.shared[shape.gains[i]] * stretch.input(i).reference).sum();
     let mse = rss / rows as f64;
     let mut parameters = main.parameters(student);
     parameters.iter_mut().for_each(|p| forget(p, stretch));
@@ -214,6 +229,7 @@ fn report(
         model,
         parameters,
         disturbances,
+        loads: loads_of(stretch, shape, found, whole.as_ref().map(|w| (w, variance)), student),
         bias: (!shape.integrating()).then(|| stretch.y_ref + linear.shared[0] - centred),
         mv_at_rest: slope.filter(|_| shape.integrating()).map(|(s, _)| stretch.u_ref - s / gain),
         drift: slope.filter(|_| !shape.integrating()),
@@ -236,6 +252,54 @@ fn report(
         reach_s: reaches_s(stretch, shape, found)[0],
         known_from: (0..stretch.segments.len()).map(|s| stretch.known(s).start - stretch.history).collect(),
     })
+}
+
+/// Independent rows beyond the unknowns: where few rows are independent, what is left over tells little of their noise, and
+/// its correlation comes out too small.
+fn freedom(rows: usize, unknowns: usize, tests: &ResidualTests) -> f64 {
+    /// As few as Student's t still has a use for.
+    const LEAST: f64 = 3.0;
+    let spare = |independent: f64, least: f64| (independent - unknowns as f64).max(least);
+    if tests.rows_per_independent > 1.0 {
+        spare(rows as f64 / tests.rows_per_independent, LEAST)
+    } else {
+        spare(rows as f64, 1.0)
+    }
+}
+
+/// The loads of a fit with their intervals.
+fn loads_of(
+    stretch: &Stretch,
+    shape: &Shape,
+    found: &Found,
+    covariance: Option<(&Symmetric, f64)>,
+    student: f64,
+) -> Vec<LoadFit> {
+    let error =
+        |at: usize| covariance.map_or(f64::INFINITY, |(c, variance)| (variance * c.at(at, at)).sqrt());
+    let around = |value: f64, error: f64| [value - student * error, value + student * error];
+    (shape.inputs()..shape.channels.len())
+        .map(|i| {
+            let (order, point, gain) = (shape.channels[i], found.points[i], shape.gains[i]);
+            let change = found.projected.linear.shared[gain];
+            let at_s = stretch.origin_s + point.dead_time_s;
+            // A jump lies between two rows.
+            let at_interval_95 = if order == Order::Jump {
+                [at_s - stretch.sample_time_s, at_s]
+            } else {
+                let last = shape.shared.len() + shape.first_unknown(i) + order.unknowns() - 1;
+                around(at_s, error(last) * point.time_s)
+            };
+            LoadFit {
+                at_s,
+                at_interval_95,
+                change,
+                change_interval_95: around(change, error(gain)),
+                order,
+                point,
+            }
+        })
+        .collect()
 }
 
 /// A time whose interval reaches far beyond the stretch, or a gain whose interval dwarfs all that was seen, is unknown.

@@ -1,7 +1,7 @@
 //! From the numbers of a fit to findings about it.
 
 use super::FitVerdict;
-use super::model_fit::ModelFit;
+use super::model_fit::{LoadFit, ModelFit};
 use super::parameters::Parameter;
 use super::problem::{FitProblem, Stretch};
 use super::statistics::resolution;
@@ -26,6 +26,7 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
             FitVerdict::Poor { fit_percent }
         });
     }
+    found.extend(diverges(problem.pv));
     parameters(fit, stretch, &mut found);
     for d in &fit.disturbances {
         let [low, high] = d.parameters[0].interval_95;
@@ -47,6 +48,14 @@ pub(super) fn of_model(fit: &ModelFit, stretch: &Stretch, problem: &FitProblem) 
     if let Some((per_second, _)) = fit.drift {
         found.push(FitVerdict::Drift { per_hour: 3600.0 * per_second });
     }
+    found.extend(fit.loads.iter().map(|load| {
+        let LoadFit { at_s, change, .. } = *load;
+        if load.integrates() {
+            FitVerdict::LoadRate { at_s, per_hour: 3600.0 * change }
+        } else {
+            FitVerdict::Load { at_s, change }
+        }
+    }));
     if fit.segments > 1 {
         found.push(FitVerdict::Segments { count: fit.segments });
     }
@@ -136,6 +145,25 @@ fn rings(fit: &ModelFit) -> Option<FitVerdict> {
         period_s: 2.0 * std::f64::consts::PI * tau / (1.0 - zeta * zeta).sqrt(),
         zeta,
     })
+}
+
+/// A PV that moves more than twice as far in each of the last eighths of its rows as in the one before.
+fn diverges(pv: &[f64]) -> Option<FitVerdict> {
+    const EIGHTHS: usize = 8;
+    const GROWTH: f64 = 2.0;
+    let rows = pv.len() / EIGHTHS;
+    if rows < 4 {
+        return None;
+    }
+    let moved: Vec<f64> = (0..EIGHTHS)
+        .map(|i| {
+            let (low, high) = range(pv[i * rows..(i + 1) * rows].iter());
+            high - low
+        })
+        .collect();
+    let grows = moved[EIGHTHS / 2 - 1..].windows(2).all(|w| w[1] > GROWTH * w[0]);
+    (grows && moved[EIGHTHS / 2 - 1] > 0.0)
+        .then(|| FitVerdict::Diverges { times: moved[EIGHTHS - 1] / moved[EIGHTHS / 2 - 1] })
 }
 
 /// Residuals smaller than a step of a PV that moves by few of them.

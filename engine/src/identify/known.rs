@@ -174,7 +174,7 @@ impl<'a> Stretch<'a> {
         let u = joined(&past.mv, &self.u);
         let u_before = u[0];
         let mut out = Self::new(joined(&past.time_s, &self.t), u, y.into(), u_before, true);
-        (out.u_ref, out.y_ref) = (self.u_ref, self.y_ref);
+        (out.u_ref, out.y_ref, out.origin_s) = (self.u_ref, self.y_ref, self.origin_s);
         let others = self.others.iter().zip(&past.disturbances);
         out.others = others.map(|(o, ahead)| Other::new(joined(ahead, &o.values))).collect();
         out.keep = self

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fopdt::Interval;
-use super::output_error::{Point, Symmetric};
+use super::output_error::{Order, Point, Symmetric};
 use super::parameters::{Coordinates, Parameter};
 use super::residual_tests::ResidualTests;
 use super::{FitVerdict, Structure};
@@ -24,6 +24,29 @@ pub struct DisturbanceFit {
     pub parameters: Vec<Parameter>,
 }
 
+/// What moved the PV once besides all that was measured: a step behind its own lag.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadFit {
+    /// When it came, in seconds of the record.
+    pub at_s: f64,
+    /// Its 95 % interval, in seconds.
+    pub at_interval_95: Interval,
+    /// What it adds to the PV in the end, in PV units; see [`Self::integrates`].
+    pub change: f64,
+    /// Its 95 % interval.
+    pub change_interval_95: Interval,
+    pub(super) order: Order,
+    pub(super) point: Point,
+}
+
+impl LoadFit {
+    /// Whether the PV runs away from it: then the change is one of its rate, in PV units per second.
+    #[must_use]
+    pub fn integrates(&self) -> bool {
+        self.order == Order::Integrator
+    }
+}
+
 /// A fitted model of one structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFit {
@@ -35,6 +58,8 @@ pub struct ModelFit {
     pub parameters: Vec<Parameter>,
     /// From measured disturbances to the PV.
     pub disturbances: Vec<DisturbanceFit>,
+    /// What moved the PV besides, where it was looked for and found.
+    pub loads: Vec<LoadFit>,
     /// PV that an MV of 0 settles at, in PV units; absent for an integrating model.
     pub bias: Option<f64>,
     /// MV at which an integrating PV stands still, in MV units.
@@ -104,7 +129,7 @@ impl ModelFit {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// The dynamics as points of the search: of the MV, then of each disturbance.
+    /// The dynamics as points of the search: of the MV, of each disturbance, of each load.
     pub(super) fn points(&self) -> Vec<Point> {
         let main = self.coordinates.point();
         let of = |d: &DisturbanceFit| {
@@ -112,7 +137,8 @@ impl ModelFit {
             let time_s = value("T_s").unwrap_or(main.time_s);
             Point { time_s, zeta: 1.0, dead_time_s: value("L_s").unwrap_or(0.0) }
         };
-        std::iter::once(main).chain(self.disturbances.iter().map(of)).collect()
+        let loads = self.loads.iter().map(|load| load.point);
+        std::iter::once(main).chain(self.disturbances.iter().map(of)).chain(loads).collect()
     }
 
     /// Adds to the covariance what else is unknown; an interval by likelihood ratio grows on both sides.

@@ -37,6 +37,16 @@ pub enum Drift {
     Auto,
 }
 
+/// Whether it is looked for something unmeasured that moved the PV once and for all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Loads {
+    /// No.
+    #[default]
+    None,
+    /// Steps, up to three, where each explains far more than chance would.
+    Auto,
+}
+
 /// What the user may say about a stretch besides its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitOptions {
@@ -46,6 +56,8 @@ pub struct FitOptions {
     pub initial_state: InitialState,
     /// Slow drift of the PV.
     pub drift: Drift,
+    /// Steps of something unmeasured.
+    pub loads: Loads,
     /// Name of the time column, for messages.
     pub time_name: String,
     /// Name of the PV column, for messages.
@@ -62,6 +74,7 @@ impl Default for FitOptions {
             mv_before: None,
             initial_state: InitialState::Free,
             drift: Drift::None,
+            loads: Loads::None,
             time_name: "time".to_owned(),
             pv_name: "PV".to_owned(),
             mv_name: "MV".to_owned(),
@@ -272,6 +285,8 @@ pub(super) struct Stretch<'a> {
     pub others: Vec<Other<'a>>,
     /// Rows whose PV counts; absent: all.
     pub keep: Option<Cow<'a, [bool]>>,
+    /// Stamp of the problem's first row, in seconds: times of loads count from here.
+    pub origin_s: f64,
 }
 
 /// A further input with the values it is centred with.
@@ -323,6 +338,7 @@ impl<'a> Stretch<'a> {
         }
         let (u_ref, y_ref) = (mean(&u), mean(&y));
         Self {
+            origin_s: t[0],
             t,
             u,
             y,
@@ -429,6 +445,7 @@ impl<'a> Stretch<'a> {
             }
         }
         let mut copy = Stretch::new(t.into(), u.into(), y.into(), self.u_before, !self.at_rest);
+        copy.origin_s = self.origin_s;
         copy.others = others
             .into_iter()
             .zip(&self.others)

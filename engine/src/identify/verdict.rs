@@ -122,6 +122,37 @@ pub enum FitVerdict {
         /// In PV units per hour.
         per_hour: f64,
     },
+    /// Something unmeasured moved the PV once, and was fitted along.
+    Load {
+        /// When, in seconds of the record.
+        at_s: f64,
+        /// What it adds to the PV, in PV units.
+        change: f64,
+    },
+    /// Something unmeasured changed the rate of an integrating PV once, and was fitted along.
+    LoadRate {
+        /// When, in seconds of the record.
+        at_s: f64,
+        /// What it adds to the rate, in PV units per hour.
+        per_hour: f64,
+    },
+    /// The gain changes with the level of the MV.
+    GainByLevel {
+        /// Lowest and highest MV, in MV units.
+        levels: [f64; 2],
+        /// Gain there.
+        gains: [f64; 2],
+    },
+    /// The PV runs away.
+    Diverges {
+        /// How much farther the PV moves in the last eighth of the stretch than in the fourth.
+        times: f64,
+    },
+    /// What came unmeasured came with a move of the MV.
+    LoadWithMv {
+        /// When, in seconds of the record.
+        at_s: f64,
+    },
     /// The stretch has gaps.
     Segments {
         /// Pieces fitted with a free state each.
@@ -201,9 +232,12 @@ impl std::fmt::Display for FitVerdict {
                 "what the model leaves over still follows the MV (correlation {} after {lag} rows): the process has more in it than this structure, and the intervals are those of a structure that holds: too narrow",
                 n(*correlation)
             ),
-            Self::Drift { per_hour } => {
-                write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
-            }
+            Self::Drift { .. }
+            | Self::Load { .. }
+            | Self::LoadRate { .. }
+            | Self::LoadWithMv { .. }
+            | Self::GainByLevel { .. }
+            | Self::Diverges { .. } => self.write_process(f),
             Self::Segments { count } => {
                 write!(f, "the stretch has gaps: fitted as {count} segments, each with its own start")
             }
@@ -237,6 +271,11 @@ impl Explain for FitVerdict {
             Self::ResidualsCorrelated { .. } => "verdict.residuals_correlated",
             Self::ResidualsFollowInput { .. } => "verdict.residuals_follow_input",
             Self::Drift { .. } => "verdict.drift",
+            Self::Load { .. } => "verdict.load",
+            Self::LoadRate { .. } => "verdict.load_rate",
+            Self::GainByLevel { .. } => "verdict.gain_by_level",
+            Self::Diverges { .. } => "verdict.diverges",
+            Self::LoadWithMv { .. } => "verdict.load_with_mv",
             Self::Segments { .. } => "verdict.segments",
             Self::StartsAtRest { .. } => "verdict.starts_at_rest",
         }
@@ -286,6 +325,16 @@ impl Explain for FitVerdict {
                 vec![n("correlation", correlation), ("lag", lag.to_string())]
             }
             Self::Drift { per_hour } => vec![n("per_hour", per_hour)],
+            Self::Load { at_s, change } => vec![n("at_s", at_s), n("change", change)],
+            Self::LoadRate { at_s, per_hour } => vec![n("at_s", at_s), n("per_hour", per_hour)],
+            Self::GainByLevel { levels, gains } => vec![
+                n("low", &levels[0]),
+                n("high", &levels[1]),
+                n("gain_low", &gains[0]),
+                n("gain_high", &gains[1]),
+            ],
+            Self::Diverges { times } => vec![n("times", times)],
+            Self::LoadWithMv { at_s } => vec![n("at_s", at_s)],
             Self::Segments { count } => vec![("count", count.to_string())],
             Self::StartsAtRest { mv_before } => vec![n("mv_before", mv_before)],
         }
@@ -335,12 +384,58 @@ impl FitVerdict {
         }
     }
 
+    /// What is said of a process that is more than a linear answer to its MV; nothing for the others.
+    fn write_process(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let n = number;
+        match self {
+            Self::Drift { per_hour } => {
+                write!(f, "a drift of {} an hour that follows no input was taken out", n(*per_hour))
+            }
+            Self::Load { at_s, change } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: it adds {} to the PV and was fitted along",
+                n(*at_s),
+                n(*change)
+            ),
+            Self::LoadRate { at_s, per_hour } => write!(
+                f,
+                "the process was moved by something unmeasured at t = {} s: from there on the PV moves by {} more an hour, which was fitted along",
+                n(*at_s),
+                n(*per_hour)
+            ),
+            Self::GainByLevel { levels, gains } => write!(
+                f,
+                "the gain changes with the MV: about {} at {}, about {} at {}; one linear model holds between them only on average, fit a stretch near the level at which the loop runs",
+                n(gains[0]),
+                n(levels[0]),
+                n(gains[1]),
+                n(levels[1])
+            ),
+            Self::Diverges { times } => write!(
+                f,
+                "the PV runs away: in the last eighth of the stretch it moves {} times as far as in the fourth, so that the last rows outweigh all others and the intervals are those of a model that holds however far it goes; choose a stretch that ends earlier",
+                n(*times)
+            ),
+            Self::LoadWithMv { at_s } => write!(
+                f,
+                "something unmeasured moved the process at t = {} s together with the MV: which of the two did what, this stretch hardly tells; move the MV once more on its own",
+                n(*at_s)
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Whether it speaks against using the model.
     #[must_use]
     pub fn is_objection(&self) -> bool {
         !matches!(
             self,
-            Self::Good { .. } | Self::Segments { .. } | Self::StartsAtRest { .. } | Self::Drift { .. }
+            Self::Good { .. }
+                | Self::Segments { .. }
+                | Self::StartsAtRest { .. }
+                | Self::Drift { .. }
+                | Self::Load { .. }
+                | Self::LoadRate { .. }
         )
     }
 
@@ -380,6 +475,11 @@ impl FitVerdict {
             Self::ResidualsCorrelated { correlation: 0.82, rows: 10.0 },
             Self::ResidualsFollowInput { correlation: 0.31, lag: 4 },
             Self::Drift { per_hour: -0.4 },
+            Self::Load { at_s: 420.0, change: -3.2 },
+            Self::LoadRate { at_s: 420.0, per_hour: 1.8 },
+            Self::LoadWithMv { at_s: 420.0 },
+            Self::GainByLevel { levels: [10.0, 20.0], gains: [2.0, 4.0] },
+            Self::Diverges { times: 340.0 },
             Self::Segments { count: 3 },
             Self::StartsAtRest { mv_before: 0.0 },
         ]

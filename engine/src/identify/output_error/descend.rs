@@ -22,6 +22,8 @@ const ZETA: [f64; 2] = [0.01, 30.0];
 pub(in crate::identify) struct Bounds {
     pub time_s: [f64; 2],
     pub dead_time_s: f64,
+    /// For the time of a load.
+    pub load_s: f64,
 }
 
 impl Bounds {
@@ -30,13 +32,21 @@ impl Bounds {
         Self {
             time_s: [stretch.sample_time_s / 30.0, 100.0 * stretch.span_s()],
             dead_time_s: 0.9 * stretch.span_s(),
+            load_s: stretch.span_s() + stretch.t[0] - stretch.origin_s,
         }
+    }
+
+    /// The points of a shape within the bounds.
+    pub fn clip_all(&self, shape: &Shape, points: &[Point]) -> Vec<Point> {
+        let load = |i: usize| i >= shape.inputs();
+        let within = |i: usize| if load(i) { Self { dead_time_s: self.load_s, ..*self } } else { *self };
+        points.iter().enumerate().map(|(i, p)| within(i).clip(shape.channels[i], *p)).collect()
     }
 
     pub fn clip(&self, order: Order, p: Point) -> Point {
         Point {
             time_s: match order {
-                Order::Integrator => p.time_s,
+                Order::Integrator | Order::Jump => p.time_s,
                 _ => p.time_s.clamp(self.time_s[0], self.time_s[1]),
             },
             zeta: p.zeta.clamp(ZETA[0], ZETA[1]),
@@ -91,9 +101,7 @@ pub(in crate::identify) fn refine_holding(
     count: &mut usize,
 ) -> Option<Found> {
     let bounds = Bounds::of(stretch);
-    let clip = |points: &[Point]| -> Vec<Point> {
-        points.iter().zip(&shape.channels).map(|(p, order)| bounds.clip(*order, *p)).collect()
-    };
+    let clip = |points: &[Point]| bounds.clip_all(shape, points);
     *count += 1;
     let start = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
     let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
@@ -124,7 +132,9 @@ fn held(shape: &Shape, points: &[Point], fixed: Option<usize>) -> Vec<Side> {
         } else if *order == Order::First {
             out.push(Side::None);
         }
-        out.push(if p.dead_time_s <= 0.0 { Side::Down } else { Side::None });
+        if *order != Order::Jump {
+            out.push(if p.dead_time_s <= 0.0 { Side::Down } else { Side::None });
+        }
     }
     if let Some(fixed) = fixed {
         out[fixed] = Side::Both;
@@ -155,6 +165,7 @@ fn moved(shape: &Shape, points: &[Point], step: &[f64]) -> Vec<Point> {
             match order {
                 Order::First => q.time_s *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp(),
                 Order::Integrator => {}
+                Order::Jump => return q,
                 Order::Second { .. } => {
                     q.time_s *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp();
                     q.zeta *= take().clamp(-LARGEST_STEP, LARGEST_STEP).exp();
@@ -169,6 +180,9 @@ fn moved(shape: &Shape, points: &[Point], step: &[f64]) -> Vec<Point> {
 fn difference(shape: &Shape, from: &[Point], to: &[Point]) -> Vec<f64> {
     let mut out = Vec::with_capacity(shape.unknowns);
     for ((order, a), b) in shape.channels.iter().zip(from).zip(to) {
+        if *order == Order::Jump {
+            continue;
+        }
         if *order != Order::Integrator {
             out.push((b.time_s / a.time_s).ln());
         }

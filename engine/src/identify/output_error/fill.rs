@@ -2,6 +2,7 @@
 
 use super::columns::{Columns, Gram, ROWS};
 use super::kernel::{First, Integrator, Kernel, Second};
+use super::load::stepped;
 use super::matrix2::Exponential;
 use super::shape::{Linear, ONE, Order, Point, Shape};
 use crate::identify::problem::{Input, Stretch};
@@ -30,10 +31,15 @@ pub(in crate::identify) fn blocks(
     mut visit: impl FnMut(usize, usize, &Columns),
 ) {
     let mut columns = Columns::zero(shape.columns());
-    let mut channels: Vec<Channel> = Vec::with_capacity(shape.channels.len());
-    for (i, (order, point)) in shape.channels.iter().zip(points).enumerate() {
-        channels.push(Channel::new(stretch, *order, *point, shape.places[i].first, stretch.input(i)));
-    }
+    let channel = |i: usize| -> Box<dyn Fill + '_> {
+        let (order, point, column) = (shape.channels[i], points[i], shape.places[i].first);
+        if i < shape.inputs() {
+            fed(stretch, order, point, column, stretch.input(i))
+        } else {
+            stepped(stretch, order, point, column)
+        }
+    };
+    let mut channels: Vec<Box<dyn Fill + '_>> = (0..points.len()).map(channel).collect();
     let middle_s = 0.5 * (stretch.t[0] + stretch.t[stretch.len() - 1]);
     for segment in 0..stretch.segments.len() {
         let range = stretch.segment(segment);
@@ -44,7 +50,7 @@ pub(in crate::identify) fn blocks(
             (true, false) => Free::Empty,
             (true, true) => Free::Estimated,
         };
-        let mut modes: Vec<Modes> = (0..points.len())
+        let mut modes: Vec<Modes> = (0..shape.inputs())
             .map(|i| Modes::new(shape.channels[i], points[i], shape.places[i].free, start_s, is_free))
             .collect();
         let mut first = range.start;
@@ -108,42 +114,29 @@ fn residual(
     columns.values[shape.residual] = r;
 }
 
-/// A channel with its kernel.
-enum Channel<'a> {
-    First(Feed<'a, First>),
-    Integrator(Feed<'a, Integrator>),
-    Second(Box<Feed<'a, Second>>),
+/// A channel that writes its columns.
+pub(super) trait Fill {
+    /// Writes `rows` rows from `first` on; called for all rows in their order.
+    fn fill(&mut self, s: &Stretch, first: usize, rows: usize, columns: &mut Columns);
 }
 
-impl<'a> Channel<'a> {
-    fn new(s: &Stretch<'_>, order: Order, point: Point, column: usize, input: Input<'a>) -> Self {
-        let u = input.before - input.reference;
-        match order {
-            Order::First => Self::First(Feed::new(
-                First::at_rest(point.time_s, u),
-                s,
-                point.dead_time_s,
-                column,
-                3,
-                input,
-            )),
-            Order::Integrator => {
-                let kernel = Integrator::new(point.time_s);
-                Self::Integrator(Feed::new(kernel, s, point.dead_time_s, column, 2, input))
-            }
-            Order::Second { zero } => {
-                let kernel = Second::at_rest(point.time_s, point.zeta, u);
-                let count = if zero { 8 } else { 4 };
-                Self::Second(Box::new(Feed::new(kernel, s, point.dead_time_s, column, count, input)))
-            }
+/// A channel from an input.
+fn fed<'a>(
+    s: &Stretch<'_>,
+    order: Order,
+    point: Point,
+    column: usize,
+    input: Input<'a>,
+) -> Box<dyn Fill + 'a> {
+    let (u, l) = (input.before - input.reference, point.dead_time_s);
+    match order {
+        Order::First | Order::Jump => {
+            Box::new(Feed::new(First::at_rest(point.time_s, u), s, l, column, 3, input))
         }
-    }
-
-    fn fill(&mut self, s: &Stretch, first: usize, rows: usize, columns: &mut Columns) {
-        match self {
-            Self::First(feed) => feed.fill(s, first, rows, columns),
-            Self::Integrator(feed) => feed.fill(s, first, rows, columns),
-            Self::Second(feed) => feed.fill(s, first, rows, columns),
+        Order::Integrator => Box::new(Feed::new(Integrator::new(point.time_s), s, l, column, 2, input)),
+        Order::Second { zero } => {
+            let kernel = Second::at_rest(point.time_s, point.zeta, u);
+            Box::new(Feed::new(kernel, s, l, column, if zero { 8 } else { 4 }, input))
         }
     }
 }
@@ -193,6 +186,34 @@ impl<'a, K: Kernel> Feed<'a, K> {
         }
     }
 
+    fn advance(&mut self, s: &Stretch, k: usize) {
+        let mut now = s.t[k - 1];
+        while self.next < k && self.next_switch_s < s.t[k] {
+            let u = self.input.centred(Some(self.next));
+            if u != self.delayed {
+                let at = self.next_switch_s.max(now);
+                self.hold(at - now);
+                now = at;
+                self.kernel.jump(u - self.delayed);
+                self.delayed = u;
+            }
+            self.next += 1;
+            self.next_switch_s = s.t[self.next] + self.dead_time_s;
+        }
+        self.hold(s.t[k] - now);
+    }
+
+    fn hold(&mut self, duration_s: f64) {
+        let factors = match self.last {
+            Some((last_s, factors)) if last_s == duration_s => factors,
+            _ => self.kernel.factors(duration_s),
+        };
+        self.last = Some((duration_s, factors));
+        self.kernel.hold(&factors, self.delayed);
+    }
+}
+
+impl<K: Kernel> Fill for Feed<'_, K> {
     fn fill(&mut self, s: &Stretch, first: usize, rows: usize, columns: &mut Columns) {
         for i in 0..rows {
             let k = first + i;
@@ -220,32 +241,6 @@ impl<'a, K: Kernel> Feed<'a, K> {
             }
         }
         self.kernel.flush();
-    }
-
-    fn advance(&mut self, s: &Stretch, k: usize) {
-        let mut now = s.t[k - 1];
-        while self.next < k && self.next_switch_s < s.t[k] {
-            let u = self.input.centred(Some(self.next));
-            if u != self.delayed {
-                let at = self.next_switch_s.max(now);
-                self.hold(at - now);
-                now = at;
-                self.kernel.jump(u - self.delayed);
-                self.delayed = u;
-            }
-            self.next += 1;
-            self.next_switch_s = s.t[self.next] + self.dead_time_s;
-        }
-        self.hold(s.t[k] - now);
-    }
-
-    fn hold(&mut self, duration_s: f64) {
-        let factors = match self.last {
-            Some((last_s, factors)) if last_s == duration_s => factors,
-            _ => self.kernel.factors(duration_s),
-        };
-        self.last = Some((duration_s, factors));
-        self.kernel.hold(&factors, self.delayed);
     }
 }
 
@@ -277,7 +272,7 @@ impl Modes {
     fn fill(&mut self, s: &Stretch, first: usize, rows: usize, columns: &mut Columns) {
         let count = match self.order {
             Order::First => 2,
-            Order::Integrator => 0,
+            Order::Integrator | Order::Jump => 0,
             Order::Second { .. } => 6,
         };
         if self.free == Free::Absent {
@@ -290,7 +285,7 @@ impl Modes {
         }
         match self.order {
             Order::First => self.fill_first(s, first, rows, columns),
-            Order::Integrator => {}
+            Order::Integrator | Order::Jump => {}
             Order::Second { .. } => self.fill_second(s, first, rows, columns),
         }
     }

@@ -75,7 +75,7 @@ fn look_around(stretch: &Stretch, shape: &Shape, best: Found, work: &mut Work) -
     const ROWS: usize = 20_000;
     let mut best = best;
     let h = stretch.sample_time_s;
-    for channel in 0..shape.channels.len() {
+    for channel in 0..shape.inputs() {
         let found = best.points[channel];
         if h <= 0.02 * found.time_s || stretch.len() > ROWS || blurred(stretch, shape, &best, channel) {
             continue;
@@ -207,6 +207,7 @@ fn main_starts(stretch: &Stretch, alone: &Shape, near: &Near, count: &mut usize)
             scan(stretch, alone, grid, count).into_iter().map(|points| points[0]).collect()
         }
         Order::Second { .. } => second_starts(stretch, alone, near, count),
+        Order::Jump => vec![],
     }
 }
 

@@ -14,6 +14,8 @@ pub(in crate::identify) enum Order {
         /// Whether Tz is free; 0 otherwise.
         zero: bool,
     },
+    /// A load that is there at once; its row is searched, not descended to.
+    Jump,
 }
 
 impl Order {
@@ -23,6 +25,7 @@ impl Order {
             Self::First => 2,
             Self::Integrator => 1,
             Self::Second { .. } => 3,
+            Self::Jump => 0,
         }
     }
 
@@ -38,7 +41,7 @@ impl Order {
     fn modes(self) -> usize {
         match self {
             Self::First => 1,
-            Self::Integrator => 0,
+            Self::Integrator | Self::Jump => 0,
             Self::Second { .. } => 2,
         }
     }
@@ -51,7 +54,7 @@ pub(in crate::identify) struct Point {
     pub time_s: f64,
     /// ζ; 1 where there is none.
     pub zeta: f64,
-    /// L in seconds.
+    /// L in seconds; of a load its time, counted from the first row of the problem.
     pub dead_time_s: f64,
 }
 
@@ -75,7 +78,10 @@ pub(in crate::identify) struct ChannelColumns {
 /// Channels, drift, and the columns they take.
 #[derive(Debug, Clone)]
 pub(in crate::identify) struct Shape {
+    /// Of the MV, of each disturbance, of each load.
     pub channels: Vec<Order>,
+    /// How many of them, the last, answer a unit step that nobody measured.
+    pub loads: usize,
     pub drift: bool,
     /// Whether the state of each segment is free.
     pub free: bool,
@@ -101,6 +107,13 @@ pub(in crate::identify) const ONE: usize = 0;
 
 impl Shape {
     pub fn new(channels: Vec<Order>, drift: bool, free: bool) -> Self {
+        Self::with_loads(channels, &[], drift, free)
+    }
+
+    /// The shape with loads besides the inputs.
+    pub fn with_loads(mut channels: Vec<Order>, loads: &[Order], drift: bool, free: bool) -> Self {
+        let inputs = channels.len();
+        channels.extend(loads);
         let integrating = channels.contains(&Order::Integrator);
         let one = Term { column: ONE, derivatives: vec![] };
         let (mut shared, mut local) = (vec![], vec![]);
@@ -118,7 +131,7 @@ impl Shape {
         });
         let (mut gains, mut places) = (vec![], vec![]);
         let mut first_unknown = 0;
-        for order in &channels {
+        for (i, order) in channels.iter().enumerate() {
             gains.push(shared.len());
             let unknowns = order.unknowns();
             let first = next;
@@ -128,7 +141,7 @@ impl Shape {
                 next += 1 + unknowns;
             }
             let modes_start = next;
-            for _ in 0..if free { order.modes() } else { 0 } {
+            for _ in 0..if free && i < inputs { order.modes() } else { 0 } {
                 // Modes don't depend on the dead time.
                 let derivatives = (0..unknowns - 1).map(|k| (first_unknown + k, next + 1 + k)).collect();
                 local.push(Term { column: next, derivatives });
@@ -139,6 +152,7 @@ impl Shape {
         }
         Self {
             channels,
+            loads: loads.len(),
             drift,
             free,
             shared,
@@ -166,7 +180,13 @@ impl Shape {
     pub fn parameters(&self, stretch: &Stretch) -> usize {
         let modes = self.local.iter().filter(|t| t.column != ONE).count();
         let at_rest = if stretch.at_rest { modes } else { 0 };
-        self.unknowns + self.shared.len() + self.local.len() * stretch.live_segments() - at_rest
+        let jumps = self.channels.iter().filter(|order| **order == Order::Jump).count();
+        self.unknowns + jumps + self.shared.len() + self.local.len() * stretch.live_segments() - at_rest
+    }
+
+    /// Channels of what was measured.
+    pub fn inputs(&self) -> usize {
+        self.channels.len() - self.loads
     }
 
     /// First unknown of a channel.

@@ -9,7 +9,7 @@
 
 use std::borrow::Cow;
 
-use crate::identify::fit_structure::{free_run, shape_of};
+use crate::identify::fit_structure::{free_run, shape_like};
 use crate::identify::output_error::{Found, Point, Shape, Symmetric, refine};
 use crate::identify::problem::{FitProblem, Stretch};
 use crate::identify::statistics::mean;
@@ -182,11 +182,6 @@ fn range(values: &[f64]) -> [f64; 2] {
 fn stretch_like<'a>(problem: &FitProblem<'a>, fit: &ModelFit) -> Option<Stretch<'a>> {
     let stretch = problem.stretch().ok()?;
     Some(stretch.known_after(fit.reach_s).unwrap_or(stretch))
-}
-
-/// The shape of a fit, on its stretch.
-fn shape_like(stretch: &Stretch, fit: &ModelFit) -> Shape {
-    shape_of(stretch, fit.structure, fit.drift.is_some())
 }
 
 /// Limits descended again with the structure of a fit; `problem` holds the MV as it was logged.

@@ -26,7 +26,8 @@ pub use mode::ModeColumn;
 pub use stiction::Oscillation;
 
 use super::{
-    Choice, FitError, FitProblem, ReactionCurve, ReactionCurveError, Structure, choose_among, reaction_curve,
+    Choice, FitError, FitProblem, Loads, ReactionCurve, ReactionCurveError, Structure, choose_among,
+    reaction_curve,
 };
 use crate::analyze::is_closed_loop_stable;
 use crate::model::ProcessModel;
@@ -88,6 +89,7 @@ pub fn study_loop(record: &LoopRecord, options: &StudyOptions) -> Result<LoopStu
     let mut problem = record.problem.clone();
     problem.check_columns()?;
     check_length(record)?;
+    problem.options.loads = Loads::Auto;
     let mut findings = Vec::new();
     let rows = problem.time_s.len();
     let mut saturated = vec![false; rows];
