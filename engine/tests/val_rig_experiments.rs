@@ -82,8 +82,10 @@ impl StepTest {
     /// Standard error that no unbiased estimate falls short of (Cramér and Rao), for white noise of [`NOISE_CM`].
     fn bound(&self, name: &str) -> f64 {
         let fit = &self.clean;
-        let freedom = (fit.rows - fit.unknowns) as f64;
-        let used = (fit.mse * fit.rows as f64 / freedom * fit.tests.rows_per_independent).sqrt();
+        // What the linear model leaves of the noise-free response is no noise: few of its rows are independent.
+        let independent = fit.rows as f64 / fit.tests.rows_per_independent;
+        let freedom = (independent - fit.unknowns as f64).max(3.0);
+        let used = (fit.mse * fit.rows as f64 / freedom).sqrt();
         fit.parameter(name).expect("a parameter").standard_error / used * NOISE_CM
     }
 
