@@ -10,7 +10,7 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use vasos_engine::control::Mode;
-use vasos_engine::identify::{FitProblem, FitVerdict, ModelFit, Structure, fit_model};
+use vasos_engine::identify::{FitError, FitProblem, FitVerdict, ModelFit, Structure, fit_model};
 use vasos_engine::plant::{Measurement, Network, Transmitter};
 use vasos_engine::session::RigCommand;
 use vasos_engine::sim::ClosedLoop;
@@ -64,6 +64,10 @@ impl StepTest {
     }
 
     fn fit(&self, seed: u64, resolution: bool) -> ModelFit {
+        self.try_fit(seed, resolution).expect("a fit")
+    }
+
+    fn try_fit(&self, seed: u64, resolution: bool) -> Result<ModelFit, FitError> {
         let mut rng = StdRng::seed_from_u64(seed);
         let how = Measurement { noise: false, quantisation: true, resolution };
         let mut sensor = self.sensor.clone();
@@ -72,7 +76,7 @@ impl StepTest {
         let (mut idle, mut mishaps) = (StdRng::seed_from_u64(0), StdRng::seed_from_u64(0));
         let mut seen = |y: f64| sensor.measure(y, how, true, &mut idle, &mut mishaps).level_cm;
         let pv: Vec<f64> = self.level_cm.iter().zip(noise).map(|(y, e)| seen(y + NOISE_CM * e)).collect();
-        fit_model(&FitProblem::new(&self.time_s, &pv, &self.mv), Structure::Fopdt).expect("a fit")
+        fit_model(&FitProblem::new(&self.time_s, &pv, &self.mv), Structure::Fopdt)
     }
 
     fn truth(&self, name: &str) -> f64 {
@@ -137,20 +141,29 @@ fn val_rig_steps_scatter_as_they_must_over_2000() {
 }
 
 /// Steps of a tenth of the size: the dead time drowns in the noise, its interval is cut at 0 and the verdict says so.
-/// The interval of a dead time of nearly 0 clears 0 by chance in a few records of a hundred.
+/// The interval of a dead time of nearly 0 clears 0 by chance in a few records of a hundred; one in two thousand shows no
+/// answer to the MV at all and is refused.
 fn small_steps(seeds: u64, least_percent: u64) {
     for (configuration, step_v) in [(0, 0.03), (1, 0.01)] {
         let experiment = StepTest::of(configuration, step_v);
-        let (mut said, mut cut, mut held) = (0, 0, 0);
+        let (mut said, mut cut, mut held, mut refused) = (0, 0, 0, 0);
         let truth_s = experiment.truth("L_s");
         for seed in 0..seeds {
-            let fit = experiment.fit(seed, false);
+            let fit = match experiment.try_fit(seed, false) {
+                Ok(fit) => fit,
+                Err(FitError::NothingToFit { .. }) => {
+                    refused += 1;
+                    continue;
+                }
+                Err(error) => panic!("{seed}: {error}"),
+            };
             said += u64::from(fit.verdicts.iter().any(|v| matches!(v, FitVerdict::DeadTimeUnknown { .. })));
             let [low, high] = fit.parameter("L_s").expect("L").interval_95;
             cut += u64::from(low == 0.0);
             held += u64::from((low..=high).contains(&truth_s));
         }
-        println!("{}: said {said}, cut {cut}, held {held} of {seeds}", experiment.what);
+        println!("{}: said {said}, cut {cut}, held {held}, refused {refused} of {seeds}", experiment.what);
+        assert!(refused * 500 <= seeds, "{refused} of {seeds} refused");
         assert!(
             said * 100 >= least_percent * seeds && cut >= said,
             "{}: {said}, {cut} of {seeds}",

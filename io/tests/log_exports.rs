@@ -506,3 +506,38 @@ fn times_and_numbers_of_other_countries() {
     assert_eq!(log.table.column("Flow").and_then(|c| c.unit.as_deref()), Some("m3/h"));
     assert_eq!(log.table.len(), 50);
 }
+
+/// Whatever unit the time has in its name, the log is as long as it was.
+#[test]
+fn units_of_time() {
+    for (name, unit_s) in [
+        ("Time [µs]", 1e-6),
+        ("time_us", 1e-6),
+        ("Time [msec]", 1e-3),
+        ("Time [Minuten]", 60.0),
+        ("Time (mins)", 60.0),
+        ("Time (hrs)", 3600.0),
+        ("Temps (heures)", 3600.0),
+        ("Time [days]", 86_400.0),
+        ("Time [s]", 1.0),
+    ] {
+        let row = |k: usize| format!("{},{},{}", k as f64 / unit_s, pv(k), mv(k));
+        let log = import(&rows(&format!("{name},PV,MV\n"), 60, row));
+        let end_s = log.table.time_s[59];
+        assert!((end_s - 59.0).abs() < 1e-6, "{name}: {end_s}");
+    }
+}
+
+/// Tabs part the columns where there are any; thin spaces group thousands, and a column of qualities is no mode.
+#[test]
+fn tabs_and_thin_spaces() {
+    for space in ['\u{2009}', '\u{202f}'] {
+        let row = |k: usize| {
+            format!("{k}\t1{space}{:.1}\t2{space}{:.1}\tGood", 500.0 + pv(k), 600.0 + mv(k)).replace('.', ",")
+        };
+        let log = import(&rows("Temps (s)\tNiveau cuve (mm)\tVanne (mm)\tQuality\n", 40, row));
+        let level = column(&log, "Niveau cuve");
+        assert!((level[3] - (1500.0 + pv(3))).abs() < 0.06, "{:?}", log.report.repairs);
+        assert_eq!(roles(&log)[3], None);
+    }
+}

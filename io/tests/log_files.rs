@@ -141,3 +141,24 @@ fn a_file_that_is_not_there_says_so() {
     let refused = open_log(Path::new("nowhere/at/all.csv"), &ImportOptions::default()).expect_err("no file");
     assert!(matches!(refused, ImportError::Read { .. }), "{refused}");
 }
+
+/// A column goes on in another file only in its own unit.
+#[test]
+fn centimetres_do_not_go_on_in_millimetres() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = |from: usize, unit: &str, scale: f64| {
+        let row = |k: usize| format!("2024-03-07 10:{:02}:00,{},30\n", from + k, scale * (50.0 + k as f64));
+        format!("Time,PV [{unit}],OP [%]\n") + &(0..20).map(row).collect::<String>()
+    };
+    let paths = [
+        file(folder.path(), "a.csv", &rows(0, "cm", 1.0)),
+        file(folder.path(), "b.csv", &rows(20, "mm", 10.0)),
+    ];
+    let log = open_logs(&paths, &ImportOptions::default()).expect("a log");
+    assert_eq!(log.table.column("PV").and_then(|c| c.unit.as_deref()), Some("cm"));
+    let other =
+        log.table.columns.iter().find(|c| c.unit.as_deref() == Some("mm")).expect("a column of its own");
+    assert!(other.values.iter().filter(|v| v.is_finite()).all(|v| *v >= 500.0));
+    let first = values(&log, "PV");
+    assert!(first.iter().filter(|v| v.is_finite()).all(|v| *v < 100.0), "{first:?}");
+}

@@ -115,7 +115,7 @@ fn every_row_and_value_of_a_fast_run_is_in_the_file() {
 /// time, over which the fixed cost of a batch, 1 to 1.5 kB, is spread.
 #[test]
 fn a_row_costs_few_bytes() {
-    for (id, speed, most) in [("simtank1", 1.0, 400.0), ("stad", 2.0, 300.0), ("stad", 1.0, 450.0)] {
+    for (id, speed, most) in [("simtank1", 2.5, 400.0), ("stad", 2.0, 300.0), ("stad", 1.0, 450.0)] {
         let folder = folder();
         let path = folder.path().join("run.rrd");
         let session = session(id, speed);

@@ -166,6 +166,7 @@ pub fn main_with(arguments: impl Iterator<Item = OsString>) -> CliOutcome {
 #[must_use]
 pub fn run(cli: Cli) -> CliOutcome {
     let Some(command) = cli.command else { return CliOutcome::OpenWindow(cli.file) };
+    survive_file_limits();
     let answered = match &command {
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Model(arguments) => model::run(arguments),
@@ -205,6 +206,12 @@ fn say(answered: Result<Answer, Refusal>) -> u8 {
             2
         }
     }
+}
+
+/// A file that may not grow is an error of its write, no reason to die: what is recorded after it matters as well.
+fn survive_file_limits() {
+    #[cfg(unix)]
+    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default()));
 }
 
 #[cfg(test)]

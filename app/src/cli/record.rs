@@ -91,7 +91,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let asked = stop.clone();
     // A second call within one process, as tests make it, keeps the first handler.
     drop(ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)));
-    survive_file_limits();
     record(arguments, task, &stop)
 }
 
@@ -196,10 +195,4 @@ fn record(arguments: &Arguments, task: Task, stop: &AtomicBool) -> Result<Answer
     let missing = lost > 0 || lost_events > 0 || unwritten > 0;
     let status = u8::from(missing || !remarks.is_empty() || refusals > 0);
     Ok(Answer { text, remarks, status })
-}
-
-/// A file that may not grow is an error of its write, no reason to die: what is recorded after it matters as well.
-fn survive_file_limits() {
-    #[cfg(unix)]
-    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
 }

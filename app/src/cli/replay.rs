@@ -60,6 +60,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     let mut answer = answer(arguments, &recorded, &flaws)?;
     // What is missing is an answer of its own.
     answer.status = answer.status.max(u8::from(!flaws.is_empty()));
+    if flaws.is_empty() && answer.status == 0 && recorded.runs.iter().all(RecordedRun::is_empty) {
+        answer.remarks.push("the recording has no rows: it ended before the first was written".to_owned());
+        answer.status = 1;
+    }
     answer.remarks.extend(flaws);
     Ok(answer)
 }

@@ -317,12 +317,17 @@ fn numeric_kind(raw: &[f64], name: &str, stated_s: Option<f64>) -> (TimeKind, f6
     }
     let lower = name.to_lowercase();
     let has = |unit: &str| lower.split(|c: char| !c.is_alphanumeric()).any(|w| w == unit);
-    let unit_s = if has("ms") || has("millis") || has("milliseconds") {
-        1e-3
-    } else if has("min") || has("minutes") || has("minutos") {
-        60.0
-    } else if has("h") || has("hours") || has("horas") {
-        3600.0
+    let units: [(f64, &[&str]); 6] = [
+        (1e-9, &["ns", "nanoseconds"]),
+        (1e-6, &["us", "µs", "μs", "usec", "micros", "microseconds"]),
+        (1e-3, &["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "milissegundos"]),
+        (60.0, &["min", "mins", "minute", "minutes", "minuten", "minuto", "minutos"]),
+        (3600.0, &["h", "hr", "hrs", "hour", "hours", "stunden", "heures", "hora", "horas"]),
+        (DAY_S, &["d", "day", "days", "tage", "jours", "dia", "dias"]),
+    ];
+    let named = units.iter().find(|(_, words)| words.iter().any(|word| has(word)));
+    let unit_s = if let Some((unit_s, _)) = named {
+        *unit_s
     } else {
         // A step that is the sample time above the rows in another unit tells that unit.
         let is_it = |unit_s: &f64| stated_s.is_some_and(|h| (step * unit_s / h - 1.0).abs() < 0.01);

@@ -25,7 +25,9 @@ pub(super) fn join(mut logs: Vec<ImportedLog>) -> Result<ImportedLog, ImportErro
         logs.sort_by(|a, b| start_s(a).total_cmp(&start_s(b)));
     }
     let names = |log: &ImportedLog| {
-        let mut names: Vec<String> = log.table.columns.iter().map(|c| c.name.clone()).collect();
+        // Centimetres do not go on in millimetres.
+        let named = |c: &LogColumn| (c.name.clone(), c.unit.clone());
+        let mut names: Vec<(String, Option<String>)> = log.table.columns.iter().map(named).collect();
         names.sort_unstable();
         names
     };

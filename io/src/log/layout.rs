@@ -147,11 +147,16 @@ fn best_candidate(lines: &[&str], judged: &[usize]) -> Option<Candidate> {
     // Beside decimal commas, commas can only separate fields that stand in quotes.
     let quoted = judged.iter().any(|&i| lines[i].contains('"'));
     let arrows = judged.iter().filter(|&&i| arrow(lines[i]).is_some()).count();
+    let tabbed = judged.iter().filter(|&&i| lines[i].trim().contains('\t')).count() * 10 > judged.len() * 9;
     let mut best: Option<Candidate> = None;
     for labelled in [false, true] {
         for separator in SEPARATORS {
             for decimal in [Decimal::Point, Decimal::Comma] {
                 if separator == Separator::Comma && decimal == Decimal::Comma && !quoted {
+                    continue;
+                }
+                // Blanks beside tabs group thousands or part the words of names.
+                if separator == Separator::Blanks && tabbed {
                     continue;
                 }
                 let dialect = Dialect { separator, arrow: arrows * 2 > judged.len(), labelled };

@@ -134,8 +134,8 @@ fn long(text: &[u8], mark: u8) -> Option<f64> {
 
 fn slow(field: &str, decimal: Decimal) -> Option<f64> {
     // Spaces of any width group thousands; a typographer's minus is one.
-    if field.contains([' ', '\u{a0}', '\u{202f}', '\u{2212}']) {
-        let spaces = [' ', '\u{a0}', '\u{202f}'];
+    if field.contains([' ', '\u{a0}', '\u{2009}', '\u{202f}', '\u{2212}']) {
+        let spaces = [' ', '\u{a0}', '\u{2009}', '\u{202f}'];
         let plain = field.trim_end_matches('%').trim_end().replace('\u{2212}', "-").replace(spaces, "'");
         return slow(&plain, decimal);
     }

@@ -25,7 +25,7 @@ pub(super) fn is_recording(start: &[u8]) -> bool {
 /// [`ImportError::Read`] for a recording that cannot be read or has no numbers in it.
 pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, Source), ImportError> {
     let recorded = read_recorded(&Parts::of(path));
-    if let Err(error @ (RecordingError::Read { .. } | RecordingError::Nothing { .. })) = &recorded {
+    if let Err(error @ RecordingError::Nothing { .. }) = &recorded {
         return Err(ImportError::Read { reason: error.to_string() });
     }
     if let Ok(Recorded { runs, flaws, .. }) = recorded

@@ -41,8 +41,12 @@ pub(super) fn propose(table: &LogTable) -> Roles {
     let not_words: Vec<usize> = taken.iter().copied().filter(|i| !words.contains(i)).collect();
     let mode = best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| {
         // A remark here and there is no mode.
+        let is_quality = |i: &usize| {
+            let name = columns[*i].name.to_lowercase();
+            ["quality", "validity", "qualidade", "gültigkeit"].iter().any(|q| name.contains(q))
+        };
         let filled = |i: &usize| columns[*i].values.iter().filter(|v| v.is_finite()).count();
-        words.iter().copied().find(|i| 2 * filled(i) >= table.len())
+        words.iter().copied().find(|i| 2 * filled(i) >= table.len() && !is_quality(i))
     });
     taken.extend(mode);
     // A likely name on a column that never moves gives way to one that does.

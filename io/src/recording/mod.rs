@@ -17,7 +17,7 @@
 //! | `/fits/model_N` | `Scalars` | PV as measured, PV of the model | the PV's | once a fit |
 //! | `/nyquist/…` | `LineStrips2D`, `Points2D` | L(jω), unit circle, circle of Ms, −1; −Im L points up | 1 | when the loop changes |
 //! | `/checks` | `rows` | check sums of the rows and events since the last one, as TOML | – | every half minute, and at the end |
-//! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, one in two seconds at real time, when a level moves |
+//! | `/rig/water` | `Boxes2D` | the water in each tank | 1 = 1 cm of level, y down | up to 5 a second, one in two seconds at real time, some ten seconds together, when a level moves |
 //! | `/rig/walls`, `/rig/pipes` | `Boxes2D`, `LineStrips2D` | the drawing | 1 = 1 cm of height | once |
 //! | `/__properties/vasos` | text | `rig`, `run`, `program`; `rig_file`: the rig as it was set when the run began, a TOML rig file with the loops' laws, gains, setpoints and modes; `start`: configuration and imperfections | – | once |
 //!

@@ -238,12 +238,20 @@ impl Store {
     /// The run, and what of it is not as it was written; `None` for a recording of something else.
     fn run(mut self, path: &str) -> Result<Option<(RecordedRun, Vec<RecordingFlaw>)>, RecordingError> {
         let unreadable = |reason: String| RecordingError::Read { path: path.to_owned(), reason };
-        let network = match (&self.rig_file, &self.rig) {
-            (Some(text), _) => {
-                let spec: RigSpec = toml::from_str(text)
-                    .map_err(|error| unreadable(format!("its rig is not readable: {}", error.message())))?;
-                Arc::new(Network::new(spec).map_err(|error| unreadable(error.to_string()))?)
-            }
+        let of_file = self.rig_file.as_ref().map(|text| {
+            let spec: RigSpec = toml::from_str(text)
+                .map_err(|error| unreadable(format!("its rig is not readable: {}", error.message())))?;
+            Network::new(spec).map(Arc::new).map_err(|error| unreadable(error.to_string()))
+        });
+        let altered = self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[]));
+        let network = match (of_file, &self.rig) {
+            (Some(Ok(network)), _) => network,
+            // The rows of a damaged rig file are those of the preset that it was, where it was one.
+            (Some(Err(error)), Some(id)) if altered => match crate::rig::preset(id) {
+                Ok(network) => network,
+                Err(_) => return Err(error),
+            },
+            (Some(Err(error)), _) => return Err(error),
             // Recordings from before the rig was kept in them name one that ships.
             (None, Some(id)) => match crate::rig::preset(id) {
                 Ok(network) => network,

@@ -16,7 +16,7 @@ pub(super) const ROWS: &str = "rows";
 /// Wall time between two sums.
 const INTERVAL: Duration = Duration::from_secs(30);
 /// Rows after which a sum is due before its time.
-const MOST_ROWS: u64 = 10_000;
+const MOST_ROWS: u64 = 500;
 /// What stands before the sum of a text.
 const MARK: &str = "# crc32 ";
 

@@ -8,8 +8,6 @@ const OPTIMISE_BYTES: u64 = 64 * 1024 * 1024;
 
 /// Rows of a chunk: what a cut of the file, or a damaged place, costs at most.
 const MOST_ROWS: u64 = 1_000;
-/// By so much a file may grow when it gets its footer: a short one has little that could be made smaller.
-const FOOTER_BYTES: u64 = 64 * 1024;
 
 /// The file that is written while one is tidied up.
 pub(super) fn tidying_path(path: &Path) -> PathBuf {
@@ -31,7 +29,7 @@ pub(super) fn tidy(path: &Path) {
         ..rerun::rrd::OptimizationProfile::OBJECT_STORE
     };
     let better = rerun::rrd::optimize_file(path, &beside, &profile).is_ok()
-        && (1..=size(path) + FOOTER_BYTES).contains(&size(&beside));
+        && (1..=size(path)).contains(&size(&beside));
     if !(better && std::fs::rename(&beside, path).is_ok()) {
         drop(std::fs::remove_file(&beside));
     }

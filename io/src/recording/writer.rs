@@ -19,7 +19,7 @@ use super::output::{Keep, Output};
 use super::run_sink::Message;
 use super::seal::{self, CHECKS, Sealing};
 use super::status::Status;
-use super::tanks::Tanks;
+use super::tanks::{Tanks, WaterBox};
 use super::told::{self, told};
 use super::trouble::RecordingTrouble;
 use super::words;
@@ -30,6 +30,8 @@ const BATCH: Duration = Duration::from_millis(950);
 const MOST_ROWS: usize = 2_000;
 /// Frames of the drawing in a batch.
 const MOST_FRAMES: usize = 5;
+/// Batches at real time of which the frames go together.
+const STILL_BATCHES: usize = 10;
 /// How long a closing recorder waits for its sink to be let go.
 const LAST_ROWS: Duration = Duration::from_secs(1);
 
@@ -44,8 +46,9 @@ struct Run {
     groups: Vec<Group>,
     levels: Vec<usize>,
     tanks: Tanks,
-    /// Batches without a frame of the drawing.
+    /// Batches since the drawing was logged, and its frames since then: time, wall clock, parts.
     still: usize,
+    water: Vec<(f64, i64, Vec<WaterBox>)>,
     sealing: Sealing,
 }
 
@@ -179,7 +182,8 @@ impl Writer {
         stream.flush_with_timeout(BATCH)?;
         let (channels, sealing) = (channels.clone(), Sealing::new());
         let number = *number;
-        self.run = Some(Run { number, stream, channels, groups, levels, tanks, still: 0, sealing });
+        self.run =
+            Some(Run { number, stream, channels, groups, levels, tanks, still: 0, water: vec![], sealing });
         Ok(())
     }
 
@@ -237,7 +241,7 @@ impl Writer {
     /// Logs the check sum of the rows since the last one.
     fn seal(&mut self) {
         let Some(run) = &mut self.run else { return };
-        if let Err(error) = run.log_check() {
+        if let Err(error) = run.send_water().and_then(|()| run.log_check()) {
             self.report(&*error);
         }
     }
@@ -279,19 +283,18 @@ impl Run {
         self.log_water(rows)
     }
 
-    /// A few frames of the drawing, evenly spaced over the batch, where a level has moved.
+    /// A few frames of the drawing, evenly spaced over the batch, where a level has moved. At real time a frame in two
+    /// seconds is smooth enough for water, and a few of them go together: a message of its own costs as much as a batch
+    /// of rows.
     fn log_water(&mut self, rows: &Rows) -> LogResult {
         let width = self.channels.len();
         let count = rows.time_s.len();
-        // At real time a frame in two seconds is smooth enough for water.
-        let slow = count <= 2 * MOST_FRAMES;
+        let (slow, first) = (count <= 2 * MOST_FRAMES, !self.tanks.is_drawn());
         self.still += 1;
-        if slow && self.tanks.is_drawn() && self.still < 2 {
+        if slow && !first && !self.still.is_multiple_of(2) {
             return Ok(());
         }
         let frames = if slow { 1 } else { MOST_FRAMES };
-        let (mut time_s, mut wall_ns) = (vec![], vec![]);
-        let (mut centers, mut halves, mut radii, mut lengths) = (vec![], vec![], vec![], vec![]);
         for frame in 0..=frames {
             // The first row of all is drawn as well; of other batches the last of each part.
             let row = (frame * count / frames).saturating_sub(1);
@@ -300,28 +303,33 @@ impl Run {
             }
             let values = &rows.values[row * width..(row + 1) * width];
             let levels: Vec<f32> = self.levels.iter().map(|&c| values[c] as f32).collect();
-            if !self.tanks.moved(&levels) {
-                continue;
-            }
-            let water = self.tanks.frame(&levels);
-            time_s.push(rows.time_s[row]);
-            wall_ns.push(rows.wall_ns[row]);
-            lengths.push(water.len());
-            for part in water {
-                centers.push(part.center);
-                halves.push(part.half);
-                radii.push(part.radius);
+            if self.tanks.moved(&levels) {
+                self.water.push((rows.time_s[row], rows.wall_ns[row], self.tanks.frame(&levels)));
             }
         }
-        if time_s.is_empty() {
+        if slow && !first && self.still < STILL_BATCHES {
             return Ok(());
         }
+        self.send_water()
+    }
+
+    /// Logs the frames that wait.
+    fn send_water(&mut self) -> LogResult {
         self.still = 0;
+        let water = std::mem::take(&mut self.water);
+        if water.is_empty() {
+            return Ok(());
+        }
         let times = [
-            TimeColumn::new_duration_secs(TIME, time_s),
-            TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, wall_ns),
+            TimeColumn::new_duration_secs(TIME, water.iter().map(|frame| frame.0)),
+            TimeColumn::new_timestamp_nanos_since_epoch(WALL_CLOCK, water.iter().map(|frame| frame.1)),
         ];
-        let boxes = Boxes2D::update_fields().with_centers(centers).with_half_sizes(halves).with_radii(radii);
+        let lengths: Vec<usize> = water.iter().map(|frame| frame.2.len()).collect();
+        let parts = || water.iter().flat_map(|frame| &frame.2);
+        let boxes = Boxes2D::update_fields()
+            .with_centers(parts().map(|part| part.center))
+            .with_half_sizes(parts().map(|part| part.half))
+            .with_radii(parts().map(|part| part.radius));
         Ok(self.stream.send_columns(format!("{RIG}/water"), times, boxes.columns(lengths)?)?)
     }
 
