@@ -67,15 +67,17 @@ fn question(view: &View, row: &Row) -> Option<Question> {
     let tag = rig.active_loops().get(view.focus)?.id.clone();
     let settings = rig.loops.get(&tag)?;
     // What is in use is tried as it is, another row as the loop would take it over.
-    let (tuning, pv_filter_s, setpoint_filter_s) = if row.rule == PRESENT {
-        let tuning = PidTuning { gains: row.gains, ..settings.tuning };
-        (tuning, settings.pv_filter_s, settings.options.setpoint.filter_s)
+    let tried = if row.rule == PRESENT {
+        Applied {
+            tuning: PidTuning { gains: row.gains, ..settings.tuning },
+            pv_filter_s: settings.pv_filter_s,
+            setpoint_filter_s: settings.options.setpoint.filter_s,
+        }
     } else {
-        let Applied { tuning, pv_filter_s, setpoint_filter_s } = applied(view, row, &tag);
-        (tuning, pv_filter_s, setpoint_filter_s)
+        applied(view, row, &tag)
     };
     let mut options = Box::new(settings.options.clone());
-    options.setpoint.filter_s = setpoint_filter_s;
+    options.setpoint.filter_s = tried.setpoint_filter_s;
     let mut setup = rig.commands_after_load();
     setup.push(RigCommand::Options { tag: tag.clone(), options });
     let slow_s = entry.model.transfer_function();
@@ -88,8 +90,8 @@ fn question(view: &View, row: &Row) -> Option<Question> {
         setup,
         measurement: rig.measurement,
         seed: rig.seed,
-        tuning,
-        pv_filter_s,
+        tuning: tried.tuning,
+        pv_filter_s: tried.pv_filter_s,
         level_cm: settings.setpoint_cm,
         step_cm: STEP_CM,
         pump_share: PUMP_SHARE,
