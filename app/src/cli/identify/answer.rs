@@ -108,6 +108,18 @@ pub(super) fn model(fit: &ModelFit) -> Value {
         ("bias", json!(fit.bias)),
         ("mv_at_rest", json!(fit.mv_at_rest)),
         ("drift_per_s", json!(fit.drift.map(|d| d.0))),
+        (
+            "loads",
+            json!(
+                fit.loads
+                    .iter()
+                    .map(|load| json!({
+                        "at_s": load.at_s, "at_interval_95_s": load.at_interval_95, "change": load.change,
+                        "change_interval_95": load.change_interval_95, "integrates": load.integrates(),
+                    }))
+                    .collect::<Vec<_>>()
+            ),
+        ),
         ("fit_percent", json!(fit.fit_percent)),
         ("r2", json!(fit.r2)),
         ("mse", json!(fit.mse)),

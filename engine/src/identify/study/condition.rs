@@ -205,13 +205,18 @@ fn at_limits(mv: &[f64], manual: Option<&[bool]>, findings: &mut Vec<RecordFindi
         return saturated;
     }
     for limit in [levels[0], levels[levels.len() - 1]] {
-        let held: Vec<(usize, usize)> =
-            runs.iter().copied().filter(|r| written[r.0] == limit && r.1 >= 3).collect();
-        let rows: usize = held.iter().map(|r| r.1).sum();
-        if rows >= 5 && 200 * rows >= written.len() {
+        let held = |length: usize| -> usize {
+            runs.iter().filter(|r| written[r.0] == limit && r.1 >= length).map(|r| r.1).sum()
+        };
+        // A kick of the setpoint holds it there for a row or two: too short to tell of, long enough to spoil the
+        // controller's gains.
+        if held(2) >= 2 {
             for &k in automatic.iter().filter(|&&k| mv[k] == limit) {
                 saturated[k] = true;
             }
+        }
+        let rows = held(3);
+        if rows >= 5 && 200 * rows >= written.len() {
             findings.push(RecordFinding::MvAtLimit { limit, rows });
         }
     }

@@ -126,12 +126,17 @@ fn regress(c: &Columns, stride: usize, lag: usize, b: f64) -> Option<ControllerF
     };
     let integral = kp * ki > 0.0 && solved.errors[1] > 0.0;
     let ti_s = integral.then(|| kp / ki);
+    // A controller that integrates the error of the row before, or the mean of both, makes the same moves with another
+    // Kc: Kc Δe + Ki h e₋₁ = (Kc − Ki h) Δe + Ki h e. The log does not tell which.
+    let other_sums_s = if integral { c.sample_time_s } else { 0.0 };
+    let mut kc_interval_95 = around(kp, solved.errors[0]);
+    kc_interval_95[usize::from(kp > 0.0)] += ki * other_sums_s;
     let td_s = keep.then(|| kd / kp);
     Some(ControllerFit {
         kc: kp,
-        kc_interval_95: around(kp, solved.errors[0]),
+        kc_interval_95,
         ti_s,
-        ti_interval_95: ti_s.map(|ti| ratio(ti, 1, true)),
+        ti_interval_95: ti_s.map(|ti| ratio(ti, 1, true)).map(|[low, high]| [low, high + other_sums_s]),
         td_s,
         td_interval_95: td_s.map(|td| ratio(td, 2, false)),
         setpoint_weight: b,

@@ -9,6 +9,9 @@ const UNKNOWN: f64 = 0.25;
 /// Logarithm of the likelihood ratio of two pairs of limits up to which the log does not tell them apart.
 const UNDECIDED: f64 = 6.0;
 
+/// The squared residual behind limits must fall to this part of the one of the MV as it was logged.
+const NEEDED: f64 = 0.8;
+
 /// Models of the process with the MV that it got.
 pub(super) struct Limited {
     /// MV within its limits; absent where it is as logged.
@@ -108,6 +111,13 @@ fn at_found(
     {
         limits = better;
         out = within(problem, limits, structures);
+    }
+    // What a load explains as well, or a larger process, is no sign of limits.
+    let plain = as_logged(problem, structures);
+    if let (Ok(without), Ok(behind)) = (&plain.choice, &out.choice)
+        && behind.chosen().mse > NEEDED * without.chosen().mse
+    {
+        return plain;
     }
     findings.push(RecordFinding::MvBeyondLimits { limits, rows: beyond(problem.mv, limits) });
     let Ok(choice) = &mut out.choice else { return out };
