@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use vasos_engine::signal::{LogColumn, LogStart, LogTable};
 use vasos_io::log::{
-    DateOrder, FileFormat, ImportOptions, ImportReport, ImportedLog, Repair, TimeKind, open_log, open_logs,
+    DateOrder, Decimal, FileFormat, ImportOptions, ImportReport, ImportedLog, Repair, TimeKind, open_log,
+    open_logs,
 };
 
 use super::json::{self, shown, table};
@@ -26,6 +27,9 @@ pub(super) struct Reading {
     /// Order of day and month, where dates read both ways: `day-first` or `month-first`.
     #[arg(long, value_name = "ORDER")]
     pub dates: Option<Dates>,
+    /// Decimal mark, where numbers read both ways (1.500, 1,500): `point` or `comma`.
+    #[arg(long, value_name = "MARK")]
+    pub decimal: Option<DecimalMark>,
     /// Sheet of a workbook, where not the one with the most numbers.
     #[arg(long, value_name = "NAME")]
     pub sheet: Option<String>,
@@ -40,6 +44,15 @@ pub(super) enum Dates {
     MonthFirst,
 }
 
+/// Decimal mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum DecimalMark {
+    /// 1.5
+    Point,
+    /// 1,5
+    Comma,
+}
+
 impl Reading {
     fn options(&self) -> ImportOptions {
         ImportOptions {
@@ -48,6 +61,10 @@ impl Reading {
             date_order: self.dates.map(|dates| match dates {
                 Dates::DayFirst => DateOrder::DayFirst,
                 Dates::MonthFirst => DateOrder::MonthFirst,
+            }),
+            decimal: self.decimal.map(|mark| match mark {
+                DecimalMark::Point => Decimal::Point,
+                DecimalMark::Comma => Decimal::Comma,
             }),
             sheet: self.sheet.clone(),
         }

@@ -7,7 +7,10 @@ use eframe::egui;
 use vasos_engine::document::{DocumentCommand, LogRoles};
 use vasos_engine::experiment::ExperimentEnd;
 use vasos_io::experiment::load_experiment;
-use vasos_io::log::{DateOrder, ImportError, ImportOptions, ImportedLog, Repair, open_log, open_logs};
+use vasos_io::log::{
+    DateOrder, Decimal, FileFormat, ImportError, ImportOptions, ImportedLog, Repair, TextFormat, open_log,
+    open_logs,
+};
 use vasos_io::recording::{Parts, RecordingError, read_recorded};
 use vasos_io::rig::{FileError, load_rig};
 
@@ -326,6 +329,21 @@ fn time_ui(ui: &mut egui::Ui, sheet: &mut ImportSheet) -> bool {
             && ui.button(words).clicked()
         {
             sheet.options.date_order = Some(order);
+        }
+        let unsure = sheet.log.report.repairs.iter().any(|r| matches!(r, Repair::ThousandsOrDecimals { .. }));
+        let other = match &sheet.log.report.format {
+            FileFormat::Text(TextFormat { decimal: Decimal::Point, .. }) if unsure => {
+                Some((tr!("import_sheet.decimal_comma"), Decimal::Comma))
+            }
+            FileFormat::Text(TextFormat { decimal: Decimal::Comma, .. }) if unsure => {
+                Some((tr!("import_sheet.decimal_point"), Decimal::Point))
+            }
+            _ => None,
+        };
+        if let Some((words, mark)) = other
+            && ui.button(words).clicked()
+        {
+            sheet.options.decimal = Some(mark);
         }
     });
     sheet.options != before

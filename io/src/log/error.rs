@@ -57,6 +57,18 @@ pub enum ImportError {
         /// Rows read.
         rows: usize,
     },
+    /// Commas between the fields, and within some of their numbers.
+    #[error(
+        "the rows from line {line} on have up to {fields} fields under {names} names: their commas part fields and begin decimals, and nothing tells which; export with semicolons or decimal points"
+    )]
+    CommasInCommas {
+        /// First line of data, counted from 1.
+        line: usize,
+        /// Names above it.
+        names: usize,
+        /// Most fields of a row.
+        fields: usize,
+    },
     /// A sheet the user named is not there.
     #[error("there is no sheet '{name}': the workbook has {sheets}")]
     NoSuchSheet {
@@ -95,6 +107,7 @@ impl Explain for ImportError {
             Self::FewNumbers { .. } => "import.few_numbers",
             Self::OnlyTime { .. } => "import.only_time",
             Self::TimeStandsStill { .. } => "import.time_stands_still",
+            Self::CommasInCommas { .. } => "import.commas_in_commas",
             Self::NoSuchSheet { .. } => "import.no_such_sheet",
             Self::NotJoinable { .. } => "import.not_joinable",
             Self::NoSuchTimeColumn { .. } => "import.no_such_time_column",
@@ -112,6 +125,9 @@ impl Explain for ImportError {
             Self::OnlyTime { rows } => vec![("rows", rows.to_string())],
             Self::TimeStandsStill { name, rows } => {
                 vec![("name", name.clone()), ("rows", rows.to_string())]
+            }
+            Self::CommasInCommas { line, names, fields } => {
+                vec![("line", line.to_string()), ("names", names.to_string()), ("fields", fields.to_string())]
             }
             Self::NoSuchSheet { name, sheets } => vec![("name", name.clone()), ("sheets", sheets.clone())],
             Self::NotJoinable { file, first } => vec![("file", file.clone()), ("first", first.clone())],
@@ -142,6 +158,7 @@ impl ImportError {
             Self::FewNumbers { count: 6 },
             Self::OnlyTime { rows: 100 },
             Self::TimeStandsStill { name: "time".to_owned(), rows: 250 },
+            Self::CommasInCommas { line: 2, names: 3, fields: 6 },
             Self::NoSuchSheet { name: "Data".to_owned(), sheets: "Notes, Run 1".to_owned() },
             Self::NotJoinable { file: "b.csv".to_owned(), first: "a.csv".to_owned() },
             Self::NoSuchTimeColumn { name: "tempo".to_owned(), columns: "time, T1".to_owned() },

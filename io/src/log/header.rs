@@ -98,7 +98,7 @@ fn header_fields(line: &str, layout: &Layout, nearest: bool) -> Option<Vec<Strin
     let own = layout.dialect.separator;
     let others = SEPARATORS.into_iter().filter(|&s| s != own);
     for separator in std::iter::once(own).chain(others) {
-        let dialect = Dialect { separator, ..layout.dialect };
+        let dialect = Dialect { separator, parted: None, ..layout.dialect };
         dialect.split(line, &mut fields);
         let words = fields.iter().filter(|f| !f.is_empty() && !is_value(f, layout.decimal)).count();
         let filled: Vec<&str> = fields.iter().copied().filter(|f| !f.is_empty()).collect();

@@ -1,7 +1,6 @@
 //! What the columns of a text file hold, judged by rows from all over it.
 
 use super::layout::{Layout, is_remark};
-use super::number;
 use super::read::Kind;
 use super::source::Sample;
 use super::stamp::{Stamp, parse as parse_stamp};
@@ -18,22 +17,22 @@ pub(super) fn kinds(sample: &Sample, layout: &Layout) -> Vec<Kind> {
         layout.dialect.split(line, &mut fields);
         for (counts, &at) in seen.iter_mut().zip(&layout.used) {
             if let Some(field) = fields.get(at).filter(|f| !f.is_empty()) {
-                counts[kind(field, layout) as usize] += 1;
+                counts[kind(field, at, layout) as usize] += 1;
             }
         }
     }
     seen.iter().map(|counts| judge(*counts)).collect()
 }
 
-fn kind(field: &str, layout: &Layout) -> Kind {
-    if number::parse(field, layout.decimal).is_some() {
+fn kind(field: &str, at: usize, layout: &Layout) -> Kind {
+    if layout.number(field, at).is_some() {
         return Kind::Number;
     }
     match parse_stamp(field, layout.date_order).or_else(|| parse_stamp(field, layout.date_order.other())) {
         Some(Stamp::Full { .. }) => Kind::Full,
         Some(Stamp::Date(_)) => Kind::Date,
         Some(Stamp::Clock(_)) => Kind::Clock,
-        None if number::parse_quantity(field, layout.decimal).is_some() => Kind::Number,
+        None if layout.quantity(field, at).is_some() => Kind::Number,
         None => Kind::Words,
     }
 }

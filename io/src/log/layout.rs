@@ -1,6 +1,8 @@
 //! Where the data of a text file begins, what separates its fields and what its columns are called.
 
+use super::commas::parted;
 use super::header::name_columns;
+use super::marks::{self, Marks, Shape};
 use super::names::ColumnName;
 use super::source::Sample;
 use super::split::{Dialect, SEPARATORS, arrow};
@@ -9,6 +11,8 @@ use super::{Decimal, ImportError, ImportOptions, Separator, number};
 
 /// Lines the format is judged by.
 const SAMPLE: usize = 400;
+/// What a value is worth less that may as well be none.
+const DOUBT: f64 = 1e-3;
 /// So many times longer a log becomes when days are read as months.
 const TORN: f64 = 3.0;
 
@@ -30,8 +34,28 @@ pub(super) struct Layout {
     pub date_order: DateOrder,
     /// Whether the order of day and month is a guess.
     pub ambiguous_dates: bool,
+    /// What the marks of each field are, where any stands ahead of three digits.
+    pub marks: Vec<Option<Marks>>,
     /// Sample time that a header states, in seconds.
     pub stated_sample_time_s: Option<f64>,
+}
+
+impl Layout {
+    /// A field at its place in a row, as a number.
+    pub fn number(&self, field: &str, at: usize) -> Option<f64> {
+        match self.marks.get(at) {
+            Some(Some(marks)) if marks.grouped => number::parse_grouped(field, marks.decimal),
+            _ => number::parse(field, self.decimal),
+        }
+    }
+
+    /// The same with a unit behind.
+    pub fn quantity<'a>(&self, field: &'a str, at: usize) -> Option<(f64, &'a str)> {
+        match self.marks.get(at) {
+            Some(Some(marks)) => number::parse_quantity(field, marks.decimal, marks.grouped),
+            _ => number::parse_quantity(field, self.decimal, false),
+        }
+    }
 }
 
 /// Whether a line is a remark.
@@ -45,8 +69,8 @@ pub(super) fn is_blank(line: &str) -> bool {
 
 /// Whether a field is a number or a time stamp.
 pub(super) fn is_value(field: &str, decimal: Decimal) -> bool {
-    number::parse(field, decimal).is_some()
-        || number::parse_quantity(field, decimal).is_some()
+    number::parse_grouped(field, decimal).is_some()
+        || number::parse_quantity(field, decimal, true).is_some()
         || parse_stamp(field, DateOrder::DayFirst).is_some()
         || parse_stamp(field, DateOrder::MonthFirst).is_some()
 }
@@ -57,10 +81,12 @@ struct Count {
     all: usize,
     filled: usize,
     values: usize,
+    /// Those of them that are values only as a group of thousands, or that a comma between commas makes one.
+    doubtful: usize,
 }
 
 impl Count {
-    fn of(fields: &[&str], decimal: Decimal) -> Self {
+    fn of(fields: &[&str], decimal: Decimal, separator: Separator) -> Self {
         let filled = fields.iter().filter(|f| !f.is_empty()).count();
         let values = fields.iter().filter(|f| is_value(f, decimal)).count();
         // A date and a time of day side by side are one value: otherwise blanks would seem to separate best.
@@ -72,7 +98,12 @@ impl Count {
             )
         });
         let split = split_stamps.count().min(values);
-        Self { all: fields.len(), filled: filled - split, values: values - split }
+        let unlikely = |field: &&&str| match Shape::of(field) {
+            Shape::Lone(mark) => mark != decimal || separator.byte() == Some(mark.mark()),
+            _ => false,
+        };
+        let doubtful = fields.iter().filter(unlikely).count();
+        Self { all: fields.len(), filled: filled - split, values: values - split, doubtful }
     }
 
     fn is_data(self) -> bool {
@@ -97,12 +128,12 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
     let written: Vec<usize> = (0..lines.len()).filter(|&i| !is_blank(lines[i])).collect();
     let judged: Vec<usize> = written.iter().copied().filter(|&i| !is_remark(lines[i])).take(SAMPLE).collect();
     let none = || ImportError::NoNumbers { lines: written.len() };
-    let best = best_candidate(&lines, &judged).ok_or_else(none)?;
-    let (dialect, decimal) = (best.dialect, best.decimal);
+    let best = best_candidate(&lines, &judged, options.decimal).ok_or_else(none)?;
+    let (mut dialect, mut decimal) = (best.dialect, best.decimal);
     let mut fields = Vec::new();
     let mut count = |i: usize| {
         dialect.split(lines[i], &mut fields);
-        Count::of(&fields, decimal)
+        Count::of(&fields, decimal, dialect.separator)
     };
     let is_row = |c: Count| c.is_data() && c.all * 3 >= best.fields * 2 && c.filled * 5 >= best.filled * 3;
     let begins = value_in_front(&lines, &judged, dialect, decimal);
@@ -116,16 +147,27 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
     if rows.len() < 2 {
         return Err(ImportError::OneRow { line: start + 1 });
     }
+    let mut whole_fields = best.fields;
+    if dialect.separator == Separator::Comma
+        && dialect.is_plain()
+        && decimal == Decimal::Point
+        && let Some(ahead) = parted(&lines, rows[0], dialect)?
+    {
+        dialect.parted = Some(ahead);
+        decimal = Decimal::Comma;
+        whole_fields = usize::midpoint(best.fields, ahead);
+    }
     let mut layout = Layout {
         dialect,
         decimal,
         header_line: None,
         first_row: rows[0],
-        fields: best.fields,
+        fields: whole_fields,
         used: Vec::new(),
         names: Vec::new(),
         date_order: DateOrder::DayFirst,
         ambiguous_dates: false,
+        marks: Vec::new(),
         stated_sample_time_s: stated_sample_time(&lines[..rows[0]], decimal),
     };
     if numbered_header(&lines, &rows, &layout) {
@@ -135,6 +177,7 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
     let all: Vec<&str> =
         lines[layout.first_row..].iter().copied().chain(sample.beyond.iter().map(String::as_str)).collect();
     find_columns(&all, &mut layout);
+    marks::settle(&all, &mut layout, options.decimal);
     if let Some(order) = options.date_order {
         layout.date_order = order;
         layout.ambiguous_dates = false;
@@ -143,7 +186,7 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
     Ok(layout)
 }
 
-fn best_candidate(lines: &[&str], judged: &[usize]) -> Option<Candidate> {
+fn best_candidate(lines: &[&str], judged: &[usize], told: Option<Decimal>) -> Option<Candidate> {
     // Beside decimal commas, commas can only separate fields that stand in quotes.
     let quoted = judged.iter().any(|&i| lines[i].contains('"'));
     let arrows = judged.iter().filter(|&&i| arrow(lines[i]).is_some()).count();
@@ -152,14 +195,15 @@ fn best_candidate(lines: &[&str], judged: &[usize]) -> Option<Candidate> {
     for labelled in [false, true] {
         for separator in SEPARATORS {
             for decimal in [Decimal::Point, Decimal::Comma] {
-                if separator == Separator::Comma && decimal == Decimal::Comma && !quoted {
+                let unquoted = separator == Separator::Comma && decimal == Decimal::Comma && !quoted;
+                if unquoted || told.is_some_and(|told| told != decimal) {
                     continue;
                 }
                 // Blanks beside tabs group thousands or part the words of names.
                 if separator == Separator::Blanks && tabbed {
                     continue;
                 }
-                let dialect = Dialect { separator, arrow: arrows * 2 > judged.len(), labelled };
+                let dialect = Dialect { separator, arrow: arrows * 2 > judged.len(), labelled, parted: None };
                 let candidate = judge(lines, judged, dialect, decimal);
                 if candidate.score > best.as_ref().map_or(0.0, |b| b.score * (1.0 + 1e-9)) {
                     best = Some(candidate);
@@ -194,7 +238,7 @@ fn judge(lines: &[&str], judged: &[usize], dialect: Dialect, decimal: Decimal) -
     let mut counts: Vec<Count> = Vec::new();
     for &i in judged {
         dialect.split(lines[i], &mut fields);
-        let count = Count::of(&fields, decimal);
+        let count = Count::of(&fields, decimal, dialect.separator);
         if count.is_data() {
             counts.push(count);
         }
@@ -208,12 +252,13 @@ fn judge(lines: &[&str], judged: &[usize], dialect: Dialect, decimal: Decimal) -
         }
     }
     let alike = counts.iter().filter(|c| c.all == most.1);
-    let (values, filled) = alike.fold((0, 0), |(v, f), c| (v + c.values, f + c.filled));
+    let (values, filled, doubtful) =
+        alike.fold((0, 0, 0), |(v, f, d), c| (v + c.values, f + c.filled, d + c.doubtful));
     let purity = if filled > 0 { values as f64 / filled as f64 } else { 0.0 };
     // Blanks also stand inside dates and names: they separate only where nothing else does.
     let trust = if dialect.separator == Separator::Blanks { 0.6 } else { 1.0 };
     let trust = if dialect.labelled { 0.95 * trust } else { trust };
-    let score = values as f64 * purity.min(1.0).powi(3) * trust;
+    let score = (values as f64 - DOUBT * doubtful as f64) * purity.min(1.0).powi(3) * trust;
     Candidate { dialect, decimal, score, fields: most.1, filled: filled / most.0.max(1) }
 }
 

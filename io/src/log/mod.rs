@@ -14,6 +14,7 @@ mod assemble;
 mod axis;
 mod behaviour;
 mod calendar;
+mod commas;
 mod decode;
 mod error;
 mod fast;
@@ -22,6 +23,7 @@ mod header;
 mod join;
 mod kinds;
 mod layout;
+mod marks;
 mod merge;
 mod names;
 mod notes;
@@ -65,6 +67,8 @@ pub struct ImportOptions {
     pub time_column: Option<String>,
     /// Order of day and month, where dates read both ways.
     pub date_order: Option<DateOrder>,
+    /// Decimal mark, where numbers read both ways.
+    pub decimal: Option<Decimal>,
     /// Sheet of a workbook, where not the one with most rows.
     pub sheet: Option<String>,
 }

@@ -1,6 +1,7 @@
 //! Numbers as plants write them: decimal point or comma, exponents, a percent sign, a unit behind.
 
 use super::Decimal;
+use super::marks::Shape;
 use super::names::is_unit;
 
 /// Powers of ten that f64 holds exactly.
@@ -19,6 +20,13 @@ impl Decimal {
             Self::Comma => b',',
         }
     }
+
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Point => Self::Comma,
+            Self::Comma => Self::Point,
+        }
+    }
 }
 
 /// A trimmed field as a number; `None` for anything else, also for NaN, ∞ and the empty field.
@@ -29,8 +37,20 @@ pub(super) fn parse(field: &str, decimal: Decimal) -> Option<f64> {
     }
 }
 
-/// A number with a unit behind it, as in `23.5 °C` or `40%`: both.
-pub(super) fn parse_quantity(field: &str, decimal: Decimal) -> Option<(f64, &str)> {
+/// The same where the mark that is not the decimal one groups thousands: `1.234` beside decimal commas is 1234.
+pub(super) fn parse_grouped(field: &str, decimal: Decimal) -> Option<f64> {
+    let group = char::from(decimal.other().mark());
+    let lone = || matches!(Shape::of(field), Shape::Lone(mark) if mark != decimal);
+    parse(field, decimal).or_else(|| {
+        if !lone() {
+            return None;
+        }
+        parse(&field.replace(group, ""), decimal)
+    })
+}
+
+/// A number with a unit behind it, as in `23.5 °C` or `40%`: both. `grouped`: as [`parse_grouped`] reads it.
+pub(super) fn parse_quantity(field: &str, decimal: Decimal, grouped: bool) -> Option<(f64, &str)> {
     let starts_unit = |(at, c): (usize, char)| {
         let is_exponent = || {
             let rest = || field[at + 1..].trim_start_matches(['+', '-']);
@@ -39,7 +59,8 @@ pub(super) fn parse_quantity(field: &str, decimal: Decimal) -> Option<(f64, &str
         (c.is_alphabetic() || matches!(c, '%' | '°')) && !is_exponent()
     };
     let (end, _) = field.char_indices().find(|c| starts_unit(*c))?;
-    let (value, unit) = (parse(field[..end].trim_end(), decimal)?, field[end..].trim());
+    let read = if grouped { parse_grouped } else { parse };
+    let (value, unit) = (read(field[..end].trim_end(), decimal)?, field[end..].trim());
     is_unit(unit).then_some((value, unit))
 }
 
@@ -176,7 +197,14 @@ fn grouped(whole: &str, mark: char, has_decimals: bool) -> bool {
     rest.is_empty() && !whole.contains([',', '.', '\''])
         || (rest.len() >= if has_decimals { 1 } else { 2 }
             && (1..=3).contains(&first.len())
-            && rest.iter().all(|g| g.len() == 3 && g.bytes().all(|b| b.is_ascii_digit())))
+            && rest.iter().all(|g| g.bytes().all(|b| b.is_ascii_digit()))
+            && (rest.iter().all(|g| g.len() == 3) || mark == ',' && in_lakhs(first, &rest)))
+}
+
+/// Whether groups are those of India: 2,50,000 is a quarter of a million.
+fn in_lakhs(first: &str, rest: &[&str]) -> bool {
+    let (last, middle) = rest.split_last().unwrap_or((&"", &[]));
+    first.len() <= 2 && last.len() == 3 && !middle.is_empty() && middle.iter().all(|g| g.len() == 2)
 }
 
 #[cfg(test)]
@@ -227,6 +255,8 @@ mod tests {
             ("1 2,5", Decimal::Comma, None),
             ("1 2", Decimal::Point, None),
             ("10 000", Decimal::Point, None),
+            ("2,50,000", Decimal::Point, Some(250_000.0)),
+            ("2,5,000", Decimal::Point, None),
             ("1.5D-3", Decimal::Point, Some(1.5e-3)),
             ("1e999", Decimal::Point, None),
             ("nan", Decimal::Point, None),

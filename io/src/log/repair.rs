@@ -237,6 +237,26 @@ pub enum Repair {
         /// Time from the last row before to its first, in seconds.
         step_s: f64,
     },
+    /// Marks ahead of three digits: what the file shows elsewhere says that they group thousands.
+    GroupedThousands {
+        /// The columns.
+        columns: String,
+        /// The first such number.
+        text: String,
+        /// What it was read as.
+        value: f64,
+    },
+    /// Marks ahead of three digits that may group thousands or begin decimals.
+    ThousandsOrDecimals {
+        /// The columns.
+        columns: String,
+        /// The first such number.
+        text: String,
+        /// What it was read as.
+        value: f64,
+        /// What else it reads as.
+        other: f64,
+    },
     /// Dates that read as day/month and as month/day.
     AmbiguousDates {
         /// Month/day was taken: the clock has AM and PM.
@@ -374,6 +394,15 @@ impl std::fmt::Display for Repair {
             Self::Appended { file, step_s } => {
                 write!(f, "{file} has no dates: it was put {} s behind the last row before", number(*step_s))
             }
+            Self::GroupedThousands { columns, text, value } => {
+                write!(f, "a mark groups the thousands of {columns}: '{text}' was read as {}", number(*value))
+            }
+            Self::ThousandsOrDecimals { columns, text, value, other } => write!(
+                f,
+                "'{text}' in {columns} was read as {}; if {} is meant, name the other decimal mark",
+                number(*value),
+                number(*other)
+            ),
             Self::AmbiguousDates { month_first: false } => {
                 write!(f, "the dates read as day/month and as month/day: day/month was taken")
             }
@@ -423,6 +452,8 @@ impl Explain for Repair {
             Self::FileMerged { .. } => "repair.file_merged",
             Self::Overlap { .. } => "repair.overlap",
             Self::Appended { .. } => "repair.appended",
+            Self::GroupedThousands { .. } => "repair.grouped_thousands",
+            Self::ThousandsOrDecimals { .. } => "repair.thousands_or_decimals",
             Self::AmbiguousDates { month_first: false } => "repair.ambiguous_dates",
             Self::AmbiguousDates { month_first: true } => "repair.ambiguous_dates_month_first",
             Self::NoTimeColumn { .. } => "repair.no_time_column",
@@ -506,6 +537,15 @@ impl Explain for Repair {
                 vec![("file", file.clone()), ("count", count.to_string()), ("length_s", number(*length_s))]
             }
             Self::Appended { file, step_s } => vec![("file", file.clone()), ("step_s", number(*step_s))],
+            Self::GroupedThousands { columns, text, value } => {
+                vec![("columns", columns.clone()), ("text", text.clone()), ("value", number(*value))]
+            }
+            Self::ThousandsOrDecimals { columns, text, value, other } => vec![
+                ("columns", columns.clone()),
+                ("text", text.clone()),
+                ("value", number(*value)),
+                ("other", number(*other)),
+            ],
             Self::AmbiguousDates { .. } => Vec::new(),
             Self::NoTimeColumn { sample_time_s } => vec![("sample_time_s", number(*sample_time_s))],
         }
@@ -528,6 +568,13 @@ impl Repair {
             Self::StrayStamps { count: 1, line: 68 },
             Self::TimeRestart { line: 74, back_s: 23.7, from_line: 75, to_line: 300 },
             Self::Gaps { count: 8, line: 91, longest_s: 120.0 },
+            Self::GroupedThousands { columns: "FT1".into(), text: "1.010".into(), value: 1010.0 },
+            Self::ThousandsOrDecimals {
+                columns: "FT1".into(),
+                text: "1.500".into(),
+                value: 1.5,
+                other: 1500.0,
+            },
             Self::AmbiguousDates { month_first: false },
             Self::AmbiguousDates { month_first: true },
             Self::NoTimeColumn { sample_time_s: 1.0 },

@@ -6,11 +6,12 @@ use super::decode::Charset;
 use super::fast::{Slot, Taken, quick_row};
 use super::kinds::kinds;
 use super::layout::{Layout, is_blank, is_remark};
+use super::marks::Marks;
 use super::quotes::{FOLD, unfolded};
 use super::read::{Kind, Read, ReadColumn};
 use super::source::{Blocks, Sample};
 use super::stamp::{DateOrder, Stamp, StampReader, parse as parse_stamp};
-use super::{ImportError, Repair, number};
+use super::{ImportError, Repair};
 
 /// Letters of a text that could not be read that are told.
 const SHOWN: usize = 24;
@@ -107,7 +108,8 @@ impl<'a> Reader<'a> {
         // Where one sign is separator and decimal mark, quotes tell them apart.
         let plain = layout.dialect.is_plain()
             && separator != super::Separator::DoubleBar
-            && separator.byte() != Some(layout.decimal.mark());
+            && separator.byte() != Some(layout.decimal.mark())
+            && !layout.marks.iter().flatten().any(|marks| marks.grouped);
         let slots = if plain {
             let column = |at: usize| layout.used.iter().position(|&used| used == at);
             (0..layout.fields).map(|at| column(at).map_or(Slot::Empty, Slot::Column)).collect()
@@ -266,8 +268,8 @@ impl<'a> Reader<'a> {
         let column = &mut self.columns[i];
         match column.kind {
             _ if field.is_empty() => None,
-            Kind::Number => number::parse(field, self.layout.decimal).or_else(|| {
-                let (value, unit) = number::parse_quantity(field, self.layout.decimal)?;
+            Kind::Number => self.layout.number(field, self.layout.used[i]).or_else(|| {
+                let (value, unit) = self.layout.quantity(field, self.layout.used[i])?;
                 let first = self.suffixes[i].get_or_insert_with(|| unit.to_owned());
                 // Of a column in V a value in mV is none of its numbers.
                 (first == unit).then_some(value)
@@ -315,6 +317,12 @@ impl<'a> Reader<'a> {
                 });
             }
         }
+        let marked = self.columns.iter().zip(&self.layout.used).filter_map(|(column, &at)| {
+            let marks = self.layout.marks.get(at)?.as_ref()?;
+            (column.kind == Kind::Number && (marks.grouped || marks.doubtful))
+                .then_some((column.name.as_str(), marks))
+        });
+        repairs.extend(Marks::repairs(marked));
         let order_told = self.stamps.iter().any(|s| s.day_first || s.month_first);
         if self.layout.ambiguous_dates && !order_told {
             let month_first = self.layout.date_order == DateOrder::MonthFirst;

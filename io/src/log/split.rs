@@ -33,12 +33,14 @@ pub(super) struct Dialect {
     pub arrow: bool,
     /// Each field has its name: `T1:23.5` or `T1=23.5`.
     pub labelled: bool,
+    /// Behind so many fields each two are a number and its decimals: `0,50,00,30,00`.
+    pub parted: Option<usize>,
 }
 
 impl Dialect {
     /// Whether rows are nothing but fields and separators.
     pub fn is_plain(self) -> bool {
-        !self.arrow && !self.labelled
+        !self.arrow && !self.labelled && self.parted.is_none()
     }
 
     /// Puts the fields of a line into `fields`, which is emptied first.
@@ -60,6 +62,9 @@ impl Dialect {
                 other => split_at(rest, other.byte().unwrap_or(b','), fields),
             }
         }
+        if let Some(ahead) = self.parted {
+            put_together(rest, ahead, fields);
+        }
         if self.labelled {
             fields.iter_mut().for_each(|field| *field = labelled(field).map_or(*field, |(_, value)| value));
         }
@@ -77,6 +82,18 @@ pub(super) fn labelled(field: &str) -> Option<(&str, &str)> {
     let (name, value) = (name.trim(), value.trim());
     let numeric = value.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.'));
     (name.starts_with(char::is_alphabetic) && numeric).then_some((name, value))
+}
+
+/// Makes one field of each two behind the first `ahead`, all of them parts of `line`.
+fn put_together<'a>(line: &'a str, ahead: usize, fields: &mut Vec<&'a str>) {
+    let place = |field: &str| field.as_ptr() as usize - line.as_ptr() as usize;
+    let mut kept = ahead.min(fields.len());
+    for at in (kept..fields.len()).step_by(2) {
+        let last = fields[(at + 1).min(fields.len() - 1)];
+        fields[kept] = &line[place(fields[at])..place(last) + last.len()];
+        kept += 1;
+    }
+    fields.truncate(kept);
 }
 
 fn split_at<'a>(line: &'a str, mark: u8, fields: &mut Vec<&'a str>) {
