@@ -61,6 +61,8 @@ pub struct ControlLoop {
     /// Mode that was asked for.
     pub mode: Mode,
     pv_filter_s: f64,
+    /// Share of the way to the PV that its filter goes in a sample; none without a filter.
+    filter_share: Option<f64>,
     pub(super) filtered_pv: Option<f64>,
     shaper: SetpointShaper,
     lead_lag: LeadLag,
@@ -88,6 +90,7 @@ impl ControlLoop {
             setpoint_cm: spec.setpoint_cm,
             mode: spec.mode,
             pv_filter_s: spec.pv_filter_s,
+            filter_share: filter_share(spec.pv_filter_s, sample_time_s),
             filtered_pv: None,
             shaper: SetpointShaper::default(),
             lead_lag: LeadLag::default(),
@@ -187,6 +190,7 @@ impl ControlLoop {
     /// Changes the PV filter; it goes on from its present value.
     pub fn set_pv_filter(&mut self, pv_filter_s: f64) {
         self.pv_filter_s = pv_filter_s;
+        self.filter_share = filter_share(pv_filter_s, self.sample_time_s);
     }
 
     /// The present output in MV units.
@@ -289,12 +293,15 @@ impl ControlLoop {
     }
 
     fn filter(&mut self, pv_cm: f64) -> f64 {
-        let pv = if pv_cm.is_finite() && self.pv_filter_s > 0.0 {
-            let before = self.filtered_pv.unwrap_or(pv_cm);
-            let share = -(-self.sample_time_s / self.pv_filter_s).exp_m1();
-            before + share * (pv_cm - before)
-        } else {
-            pv_cm
+        if !pv_cm.is_finite() {
+            return pv_cm;
+        }
+        let pv = match self.filter_share {
+            Some(share) => {
+                let before = self.filtered_pv.unwrap_or(pv_cm);
+                before + share * (pv_cm - before)
+            }
+            None => pv_cm,
         };
         if pv.is_finite() {
             self.filtered_pv = Some(pv);
@@ -314,6 +321,7 @@ impl ControlLoop {
     }
 
     /// The limits of this sample.
+    #[inline]
     fn limits_now(&self, blocked: Option<Bound>) -> Limits {
         let mv = self.mv();
         let mut now = self.limits;
@@ -330,4 +338,9 @@ impl ControlLoop {
         }
         now
     }
+}
+
+/// Share of the way to the PV that a filter of first order goes in a sample; none for a time constant of 0.
+pub(super) fn filter_share(time_constant_s: f64, sample_time_s: f64) -> Option<f64> {
+    (time_constant_s > 0.0).then(|| -(-sample_time_s / time_constant_s).exp_m1())
 }

@@ -182,10 +182,12 @@ macro_rules! each {
 }
 
 impl Controller for Running {
+    #[inline(always)]
     fn step(&mut self, input: &ControlInput) -> ControlOutput {
         each!(self, law => law.step(input))
     }
 
+    #[inline]
     fn mv(&self) -> f64 {
         each!(self, law => Controller::mv(law))
     }

@@ -146,6 +146,7 @@ impl PidI2gl {
 }
 
 impl Controller for PidI2gl {
+    #[inline(always)]
     fn step(&mut self, input: &ControlInput) -> ControlOutput {
         let now = Signals { setpoint: input.setpoint, pv: input.pv };
         if !now.setpoint.is_finite() || !now.pv.is_finite() || !input.feedforward.is_finite() {

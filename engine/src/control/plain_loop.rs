@@ -2,7 +2,7 @@
 //!
 //! It does in lanes what [`ControlLoop`] does for one plant, to the last bit: the same operations in the same order.
 
-use super::control_loop::ControlLoop;
+use super::control_loop::{ControlLoop, filter_share};
 use super::controller::{Limits, Mode};
 use super::derivative::Sampled;
 use super::law::{Clip, Law, Running, Sends};
@@ -83,8 +83,7 @@ impl<V: Number> PlainLoop<V> {
 
     /// Changes the time constant of the PV filter, in seconds.
     pub fn set_pv_filter(&mut self, time_constant_s: f64) {
-        self.filter_share =
-            (time_constant_s > 0.0).then(|| -(-self.sample_time_s / time_constant_s).exp_m1());
+        self.filter_share = filter_share(time_constant_s, self.sample_time_s);
     }
 
     /// One sample with these measured PVs, which are numbers; gives the outputs.

@@ -7,35 +7,36 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::plant::spec::ConverterSpec;
 
+use super::noise::Noise;
 use super::source::{RigControls, Source};
 use crate::plant::{
     ActiveFault, Fault, FaultKind, FaultyPart, Measurement, Network, Number, Plant, Pump, Reading, RigError,
-    Transmitter, check_fault, nearest,
+    Sensor, Transmitter, check_fault, nearest,
 };
 
 /// A plant with its transmitters, converters and a seeded source of noise.
 #[derive(Debug, Clone)]
 pub struct SimulatedRig {
     plant: Plant,
-    transmitters: Vec<Transmitter>,
+    probes: Vec<Probe>,
     measurement: Measurement,
     dac_step: Option<f64>,
     written: Vec<f64>,
-    /// A source of noise for each sensor.
-    noise: Vec<Xoshiro256PlusPlus>,
     mishaps: Xoshiro256PlusPlus,
     faults: Vec<ActiveFault>,
     powered: bool,
 }
 
+/// A sensor in its tank, with its source of noise.
+#[derive(Debug, Clone)]
+struct Probe {
+    tank: usize,
+    transmitter: Transmitter,
+    noise: Noise,
+}
+
 /// Tells the source of spikes from those of noise.
 const MISHAPS: u64 = 0x005b_1ce5;
-
-/// The source of a sensor's noise: one of its own, so that no sensor's noise depends on who reads another.
-pub(crate) fn noise_of(sensor: usize, seed: u64) -> Xoshiro256PlusPlus {
-    // 2⁶⁴ over the golden ratio keeps the seeds of neighbours apart.
-    Xoshiro256PlusPlus::seed_from_u64(seed ^ (sensor as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
-}
 
 impl SimulatedRig {
     /// A rig at the state of its file.
@@ -44,21 +45,20 @@ impl SimulatedRig {
     /// [`RigError`] when the water does not fit.
     pub fn new(network: Arc<Network>, measurement: Measurement, seed: u64) -> Result<Self, RigError> {
         let converters = network.spec.converters.as_ref();
-        let transmitters = network
-            .sensors
-            .iter()
-            .map(|s| Transmitter::new(&s.spec, converters, network.spec.sample_time_s))
-            .collect();
-        let noise = (0..network.sensors.len()).map(|sensor| noise_of(sensor, seed)).collect();
+        let probe = |(index, sensor): (usize, &Sensor)| Probe {
+            tank: sensor.tank,
+            transmitter: Transmitter::new(&sensor.spec, converters, network.spec.sample_time_s),
+            noise: Noise::of_sensor(index, seed),
+        };
+        let probes = network.sensors.iter().enumerate().map(probe).collect();
         let dac_step = converters.map(ConverterSpec::dac_step_v);
         let plant = Plant::new(network)?;
         Ok(Self {
             written: plant.inputs().to_vec(),
             plant,
-            transmitters,
+            probes,
             measurement,
             dac_step,
-            noise,
             mishaps: Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS),
             faults: vec![],
             powered: true,
@@ -67,7 +67,7 @@ impl SimulatedRig {
 
     fn switch(&mut self, part: FaultyPart, fault: Fault, on: bool) {
         match (part, fault) {
-            (FaultyPart::Sensor(i), _) => self.transmitters[i].set_fault(fault, on),
+            (FaultyPart::Sensor(i), _) => self.probes[i].transmitter.set_fault(fault, on),
             (FaultyPart::Valve(i), Fault::Clogged { share }) => {
                 self.plant.set_clogged(i, if on { share } else { 1.0 });
             }
@@ -105,11 +105,10 @@ impl Source for SimulatedRig {
     }
 
     fn read(&mut self, readings: &mut [Reading]) {
-        let sensors = self.plant.network().sensors.iter().zip(&mut self.transmitters).zip(&mut self.noise);
-        for (reading, ((sensor, transmitter), noise)) in readings.iter_mut().zip(sensors) {
-            let level_cm = self.plant.levels_cm()[sensor.tank];
-            *reading =
-                transmitter.measure(level_cm, self.measurement, self.powered, noise, &mut self.mishaps);
+        let (levels_cm, how, powered) = (self.plant.levels_cm(), self.measurement, self.powered);
+        for (reading, Probe { tank, transmitter, noise }) in readings.iter_mut().zip(&mut self.probes) {
+            let level_cm = levels_cm[*tank];
+            *reading = transmitter.measure_with(level_cm, noise.draw(), how, powered, &mut self.mishaps);
         }
     }
 
@@ -186,8 +185,8 @@ impl RigControls for SimulatedRig {
     }
 
     fn set_seed(&mut self, seed: u64) {
-        for (sensor, noise) in self.noise.iter_mut().enumerate() {
-            *noise = noise_of(sensor, seed);
+        for (sensor, probe) in self.probes.iter_mut().enumerate() {
+            probe.noise = Noise::of_sensor(sensor, seed);
         }
         self.mishaps = Xoshiro256PlusPlus::seed_from_u64(seed ^ MISHAPS);
     }

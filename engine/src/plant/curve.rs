@@ -5,7 +5,12 @@
 pub(super) struct Curve {
     /// From the lowest input to the highest; together they hold for every number.
     pieces: Vec<Piece>,
+    /// Lowest input, and pieces per unit of the input where all are about as long: an input's piece is no search then.
+    even: Option<(f64, f64)>,
 }
+
+/// How much the pieces of a curve may differ in length to count as equally long, as a share of it.
+const EVEN: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Piece {
@@ -33,13 +38,21 @@ impl Curve {
             low = input;
             pieces.push(Piece { low, high: next.map_or(f64::INFINITY, |p| p[0]), input, flow, slope });
         }
-        Self { pieces }
+        let span = points[points.len() - 1][0] - points[0][0];
+        let length = span / (points.len() - 1).max(1) as f64;
+        let even = points.windows(2).all(|w| (w[1][0] - w[0][0] - length).abs() <= EVEN * length);
+        Self { pieces, even: (even && length > 0.0).then(|| (points[0][0], 1.0 / length)) }
     }
 
-    /// Flow in cm³/s; the search begins at the piece where the last input lay.
+    /// Flow in cm³/s; the search begins where the piece must be about, or at the piece where the last input lay.
     #[inline]
     pub fn flow_cm3_s(&self, input: f64, last: &mut usize) -> f64 {
-        let mut at = (*last).min(self.pieces.len() - 1);
+        let about = match self.even {
+            // The conversion stops at both ends of its range.
+            Some((low, per_input)) => (((input - low) * per_input + 1.0) as i32).max(0) as usize,
+            None => *last,
+        };
+        let mut at = about.min(self.pieces.len() - 1);
         while input < self.pieces[at].low && at > 0 {
             at -= 1;
         }

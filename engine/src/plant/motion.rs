@@ -290,7 +290,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
     fn is_inside(&self) -> bool {
         let (mut room, mut sum) = (V::of(f64::INFINITY), V::of(0.0));
         for (&level, &height) in self.end.iter().zip(&self.heights).take(self.tanks) {
-            room = room.smaller(level).smaller(height - level);
+            room = room.smaller(level.smaller(height - level));
             sum += level;
         }
         // The sum finds a level that is no number.
@@ -314,8 +314,7 @@ impl<const N: usize, const S: usize, V: Number> Motion<N, S, V> {
         most_pieces: f64,
         resolution: Resolution,
     ) -> f64 {
-        let pieces = self.streams.pieces(&self.heads, slope, most_s, resolution);
-        if pieces > 1.0 { most_s / (pieces - 1e-9).ceil().min(most_pieces) } else { most_s }
+        most_s / self.streams.pieces(&self.heads, slope, most_s, most_pieces, resolution)
     }
 
     /// What pumps bring each node from now to the next change in the air.

@@ -56,6 +56,28 @@ impl<const N: usize, const S: usize> pulp::NullaryFnOnce for Advance<'_, N, S> {
     }
 }
 
+/// [`Motions::advance`] of one length. Apart, so that a small rig does not set aside what the largest one needs of the
+/// stack.
+#[inline(never)]
+fn advance<const N: usize, const S: usize>(
+    motion: &mut Motion<N, S, f64>,
+    arch: pulp::Arch,
+    network: &Network,
+    duration_s: f64,
+    levels_cm: &mut [f64],
+    dry: &mut [bool],
+) -> bool {
+    let (left_s, fed) = arch.dispatch(Advance { motion, duration_s });
+    let careful = left_s > 0.0;
+    if careful {
+        motion.advance_carefully(network, left_s, fed, dry);
+    }
+    for (level, now) in levels_cm.iter_mut().zip(&motion.now) {
+        *level = *now;
+    }
+    careful
+}
+
 impl Motions {
     pub fn new(network: &Network, coefficients: &[f64], pipes: Vec<Pipe<f64>>) -> Self {
         Self::with_room(network.valves.len(), network, coefficients, pipes)
@@ -92,7 +114,8 @@ impl Motions {
         made
     }
 
-    /// Lets `duration_s` pass in the vector registers of `arch`; `levels_cm` gets the levels then.
+    /// Lets `duration_s` pass in the vector registers of `arch`; `levels_cm` gets the levels then. Tells whether a
+    /// tank was at its rim or empty.
     pub fn advance(
         &mut self,
         arch: pulp::Arch,
@@ -100,14 +123,8 @@ impl Motions {
         duration_s: f64,
         levels_cm: &mut [f64],
         dry: &mut [bool],
-    ) {
-        each!(self, m => {
-            let (left_s, fed) = arch.dispatch(Advance { motion: &mut **m, duration_s });
-            if left_s > 0.0 {
-                m.advance_carefully(network, left_s, fed, dry);
-            }
-            levels_cm.copy_from_slice(&m.now[..levels_cm.len()]);
-        });
+    ) -> bool {
+        each!(self, m => advance(m, arch, network, duration_s, levels_cm, dry))
     }
 
     pub fn span(&self) -> Span<'_> {

@@ -28,6 +28,7 @@ struct Volumes<const N: usize, const S: usize> {
 impl<const N: usize, const S: usize> Motion<N, S, f64> {
     /// Lets `duration_s` pass in short steps that end with it, minding rims and empty tanks. `fed` pumps have had
     /// their water; `dry` tells which of the others found none.
+    #[inline(never)]
     pub fn advance_carefully(&mut self, network: &Network, duration_s: f64, fed: bool, dry: &mut [bool]) {
         self.cut();
         let mut left_s = duration_s;

@@ -44,10 +44,17 @@ fn series<V: Number>(t: V) -> V {
 /// Roots taken anew; apart, so that what runs every time stays short.
 #[inline(never)]
 fn anew<const S: usize, V: Number>(heads: &[V; S], bends: &Bends<S, V>, count: usize) -> [V; S] {
+    let of = |i: usize| heads[i] * heads[i] * bends.bend[i] + bends.round[i];
     let mut roots = [V::of(0.0); S];
-    for (i, root) in roots.iter_mut().enumerate().take(count) {
-        let x = heads[i] * heads[i] * bends.bend[i] + bends.round[i];
-        *root = V::of(1.0) / x.sqrt().sqrt();
+    if count == S {
+        // Of a length that the compiler knows.
+        for (i, root) in roots.iter_mut().enumerate() {
+            *root = V::of(1.0) / of(i).sqrt().sqrt();
+        }
+    } else {
+        for (i, root) in roots.iter_mut().enumerate().take(count) {
+            *root = V::of(1.0) / of(i).sqrt().sqrt();
+        }
     }
     roots
 }

@@ -80,6 +80,8 @@ pub struct Transmitter {
     current: Option<Current>,
     sample_time_s: f64,
     ills: Ills,
+    /// Whether it has any of them.
+    ill: bool,
     last: Reading,
 }
 
@@ -123,6 +125,7 @@ impl Transmitter {
             current: sensor.range_cm.map(current),
             sample_time_s,
             ills: Ills::default(),
+            ill: false,
             last: Reading { level_cm: f64::NAN, status: ReadingStatus::Good },
         }
     }
@@ -139,6 +142,7 @@ impl Transmitter {
             Fault::Drift { .. } => (ills.drift_cm_s, ills.offset_cm) = (0.0, 0.0),
             _ => {}
         }
+        self.ill = self.ills != Ills::default();
     }
 
     /// Measures a true level in cm. One random number is drawn whether noise is on or off, so that
@@ -151,7 +155,37 @@ impl Transmitter {
         rng: &mut impl Rng,
         mishaps: &mut impl Rng,
     ) -> Reading {
-        let draw: f64 = StandardNormal.sample(rng);
+        self.measure_with(level_cm, StandardNormal.sample(rng), how, powered, mishaps)
+    }
+
+    /// As [`Self::measure`], with the random number already drawn.
+    #[inline(always)]
+    pub(crate) fn measure_with(
+        &mut self,
+        level_cm: f64,
+        draw: f64,
+        how: Measurement,
+        powered: bool,
+        mishaps: &mut impl Rng,
+    ) -> Reading {
+        let noise_cm = if how.noise { self.noise_cm * draw } else { 0.0 };
+        if self.ill || !powered {
+            return self.measure_ill(level_cm, noise_cm, how, powered, mishaps);
+        }
+        self.last = self.show(level_cm + noise_cm, how).judged();
+        self.last
+    }
+
+    /// Measures with whatever is wrong; apart, so that what runs every time stays short.
+    #[inline(never)]
+    fn measure_ill(
+        &mut self,
+        level_cm: f64,
+        noise_cm: f64,
+        how: Measurement,
+        powered: bool,
+        mishaps: &mut impl Rng,
+    ) -> Reading {
         self.ills.offset_cm += self.ills.drift_cm_s * self.sample_time_s;
         if self.ills.broken || !powered {
             return Reading { level_cm: f64::NAN, status: ReadingStatus::Broken };
@@ -159,18 +193,14 @@ impl Transmitter {
         if let Some(stuck) = self.ills.stuck {
             return stuck;
         }
-        let mut level_cm = level_cm + self.ills.offset_cm;
-        if how.noise {
-            level_cm += self.noise_cm * draw;
-        }
+        let mut level_cm = level_cm + self.ills.offset_cm + noise_cm;
         if let Some((height_cm, every_s)) = self.ills.spikes
             && mishaps.random::<f64>() * every_s < self.sample_time_s
         {
             level_cm += if mishaps.random::<bool>() { height_cm } else { -height_cm };
         }
-        let reading = self.show(level_cm, how).judged();
-        self.last = reading;
-        reading
+        self.last = self.show(level_cm, how).judged();
+        self.last
     }
 
     /// A level through the sensor's calibration, its resolution, the signal and the converter.
@@ -194,6 +224,7 @@ impl Transmitter {
 }
 
 impl Shown<f64> {
+    #[inline]
     fn judged(self) -> Reading {
         let status = match self.ma {
             Some((_, read_ma)) if read_ma < BROKEN_MA => ReadingStatus::Broken,

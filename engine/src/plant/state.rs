@@ -54,6 +54,8 @@ pub struct Plant {
     pumped_flows: Vec<f64>,
     arriving_flows: Vec<f64>,
     spill_flows: Vec<f64>,
+    /// Whether the last advance may have spilled.
+    spills: bool,
     dry: Vec<bool>,
 }
 
@@ -89,6 +91,7 @@ impl Plant {
             pumped_flows: zeros(pumps),
             arriving_flows: zeros(pumps),
             spill_flows: zeros(tanks),
+            spills: false,
             dry: vec![false; pumps],
             network,
         };
@@ -109,8 +112,11 @@ impl Plant {
 
     /// Lets `duration_s` pass with constant inputs. Flows afterwards are the means over `duration_s`.
     pub fn advance(&mut self, duration_s: f64) {
-        self.dry.copy_from_slice(&self.airlocked);
-        self.motion.advance(self.arch, &self.network, duration_s, &mut self.levels_cm, &mut self.dry);
+        for (dry, &airlocked) in self.dry.iter_mut().zip(&self.airlocked) {
+            *dry = airlocked;
+        }
+        let careful =
+            self.motion.advance(self.arch, &self.network, duration_s, &mut self.levels_cm, &mut self.dry);
         let span = self.motion.span();
         let per_s = 1.0 / duration_s;
         for (origin, volume) in span.origins.iter().zip(span.streams) {
@@ -119,14 +125,16 @@ impl Plant {
                 Origin::Leak(tank) => self.leak_flows[tank] = volume * per_s,
             }
         }
-        for (flow, volume) in self.pumped_flows.iter_mut().zip(span.pumped) {
-            *flow = volume * per_s;
+        for (i, (pumped, arriving)) in self.pumped_flows.iter_mut().zip(&mut self.arriving_flows).enumerate()
+        {
+            (*pumped, *arriving) = (span.pumped[i] * per_s, span.arriving[i] * per_s);
         }
-        for (flow, volume) in self.arriving_flows.iter_mut().zip(span.arriving) {
-            *flow = volume * per_s;
-        }
-        for (flow, volume) in self.spill_flows.iter_mut().zip(span.spills) {
-            *flow = volume * per_s;
+        // Only a careful step spills.
+        if careful || self.spills {
+            for (flow, volume) in self.spill_flows.iter_mut().zip(span.spills) {
+                *flow = volume * per_s;
+            }
+            self.spills = careful;
         }
     }
 

@@ -82,6 +82,8 @@ pub(crate) struct Flowing<const S: usize, V> {
 pub(crate) struct Streams<const N: usize, const S: usize, V> {
     /// Square roots first.
     streams: Vec<Stream>,
+    /// Nodes of each stream's head: `from` and `against`; twice the same beyond the streams.
+    heads_of: [(u16, u16); S],
     /// How many of them are square roots.
     square_roots: usize,
     k: [V; S],
@@ -114,6 +116,7 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         let zero = [V::of(0.0); S];
         let mut made = Self {
             streams: Vec::with_capacity(S),
+            heads_of: [(0, 0); S],
             square_roots: 0,
             k: zero,
             bends: Bends { bend: zero, round: [V::of(1.0); S] },
@@ -146,7 +149,15 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
         self.bends.bend[..self.square_roots].fill(V::of(1.0));
         self.bends.round[..self.square_roots].fill(V::of(self.delta2));
         self.valves(network, coefficients, ValveLaw::Laminar);
+        self.heads_of = [(0, 0); S];
+        for (nodes, stream) in self.heads_of.iter_mut().zip(&self.streams) {
+            // There are at most `N` of them.
+            *nodes = (stream.from as u16, stream.against as u16);
+        }
         self.couple();
+        if S <= FEW {
+            self.columns.resize(S, [V::of(0.0); N]);
+        }
     }
 
     /// Works out what each flow does to every head.
@@ -236,11 +247,11 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     /// Difference of a number of each stream's nodes: of levels its head, of slopes the head's slope.
     #[inline(always)]
     pub fn heads(&self, nodes: &[V; N]) -> [V; S] {
-        let mut heads = [V::of(0.0); S];
-        for (head, stream) in heads.iter_mut().zip(&self.streams) {
-            *head = stream.head(nodes);
-        }
-        heads
+        self.each(|i| {
+            let (from, against) = self.heads_of[i];
+            // Nodes are below N; the mask says so to the compiler.
+            nodes[usize::from(from) & (N - 1)] - nodes[usize::from(against) & (N - 1)]
+        })
     }
 
     /// Flows at these heads, from the roots of heads near by.
@@ -294,16 +305,29 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     /// Adds what the streams' volumes, or flows, bring every node, in cm or cm/s.
     #[inline(always)]
     pub fn bring(&self, volumes: &[V; S], nodes: &mut [V; N]) {
-        for ((stream, column), &volume) in self.streams.iter().zip(&self.columns).zip(volumes) {
-            if N <= SHORT && V::PLANTS == 1 {
-                for i in 0..N {
-                    nodes[i] += column[i] * volume;
+        if N <= SHORT && V::PLANTS == 1 {
+            // Summed apart from `nodes`, which for all the compiler knows the columns may overlap.
+            let mut sum = *nodes;
+            if let Ok(columns) = <&[[V; N]; S]>::try_from(self.columns.as_slice()) {
+                for j in 0..S {
+                    for i in 0..N {
+                        sum[i] += columns[j][i] * volumes[j];
+                    }
                 }
             } else {
-                let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
-                nodes[from] += column[from] * volume;
-                nodes[to] += column[to] * volume;
+                for (column, &volume) in self.columns.iter().zip(volumes) {
+                    for i in 0..N {
+                        sum[i] += column[i] * volume;
+                    }
+                }
             }
+            *nodes = sum;
+            return;
+        }
+        for ((stream, column), &volume) in self.streams.iter().zip(&self.columns).zip(volumes) {
+            let (from, to) = (stream.from & (N - 1), stream.to & (N - 1));
+            nodes[from] += column[from] * volume;
+            nodes[to] += column[to] * volume;
         }
     }
 
@@ -312,23 +336,35 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
     pub fn resolves(&self, heads: &[V; S], slope: &[V; S], step_s: f64, most: Resolution) -> bool {
         let step2 = step_s * step_s;
         let step4 = step2 * step2;
-        let mut worst = V::of(0.0);
-        for i in 0..self.slots() {
+        // Slot by slot and then the largest of all, so that the slots are worked out side by side.
+        let mut worst = [V::of(0.0); S];
+        for (i, worst) in worst.iter_mut().enumerate().take(self.slots()) {
             let (r2, change) = (heads[i] * heads[i] + V::of(self.delta2), slope[i] * step_s);
             let (change2, rate4) = (change * change, self.steepness4[i] * step4);
             // (λh)⁴ of a √ law, whose dq/dh is at most q/h = k/√r, times r².
             let scale = r2 * self.bends.bend[i] + (V::of(1.0) - self.bends.bend[i]);
             let error2 = scale * scale * (most.error_cm * most.error_cm);
-            worst = worst.larger(change2 - r2 * (most.curvature * most.curvature));
-            worst = worst.larger(rate4 - scale * most.rate.powi(4));
-            worst = worst.larger(rate4 * rate4 * change2 - error2);
+            let curved = change2 - r2 * (most.curvature * most.curvature);
+            let fast = rate4 - scale * most.rate.powi(4);
+            *worst = curved.larger(fast).larger(rate4 * rate4 * change2 - error2);
         }
-        worst.is_at_most(V::of(0.0))
+        let mut all = worst[0];
+        for &worst in worst.iter().take(self.slots()).skip(1) {
+            all = all.larger(worst);
+        }
+        all.is_at_most(V::of(0.0))
     }
 
-    /// How many pieces a step of `step_s` must be cut into so that every stream is resolved; 1 when it needs no cut.
+    /// How many pieces, at most `most_pieces`, a step of `step_s` must be cut into so that every stream is resolved.
     #[inline(never)]
-    pub fn pieces(&self, heads: &[V; S], slope: &[V; S], step_s: f64, most: Resolution) -> f64 {
+    pub fn pieces(
+        &self,
+        heads: &[V; S],
+        slope: &[V; S],
+        step_s: f64,
+        most_pieces: f64,
+        most: Resolution,
+    ) -> f64 {
         let (mut bend2, mut rate4, mut error2) = (0.0_f64, 0.0_f64, 0.0_f64);
         let step4 = step_s * step_s * step_s * step_s;
         for i in 0..self.streams.len().min(S) {
@@ -343,8 +379,18 @@ impl<const N: usize, const S: usize, V: Number> Streams<N, S, V> {
                 rate4 = rate4.max(rated4.largest());
             }
         }
-        let worst = (bend2.sqrt() / most.curvature).max(rate4.sqrt().sqrt() / most.rate).max(1.0);
-        let error_cm = error2.sqrt();
-        if error_cm > most.error_cm { worst.max((error_cm / most.error_cm).powf(0.2)) } else { worst }
+        // n pieces have an n-th of the change and of the rate. Counting up needs no roots, and a few are enough mostly.
+        let mut pieces = 1.0;
+        while pieces < most_pieces {
+            let (n2, slack) = (pieces * pieces, 1.0 + 1e-9);
+            let n4 = n2 * n2 * slack;
+            let bent = bend2 > most.curvature * most.curvature * n2 * slack;
+            let fast = rate4 > most.rate.powi(4) * n4;
+            if !(bent || fast || error2 > most.error_cm * most.error_cm * n4 * n4 * n2) {
+                break;
+            }
+            pieces += 1.0;
+        }
+        pieces
     }
 }

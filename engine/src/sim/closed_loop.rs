@@ -222,11 +222,12 @@ impl ClosedLoop {
     /// Fills the row in the order of [`ChannelSet::of`].
     fn fill_row(&mut self) {
         let (loop_cells, plant_cells) = self.row.split_at_mut(3 * self.channels.slots);
-        loop_cells.fill(f64::NAN);
-        for (cells, active) in loop_cells.chunks_exact_mut(3).zip(&self.loops) {
+        let mut loop_cells = loop_cells.chunks_exact_mut(3);
+        for (cells, active) in (&mut loop_cells).zip(&self.loops) {
             let pv_cm = self.readings[active.sensor].level_cm;
             cells.copy_from_slice(&[active.control.setpoint_cm, pv_cm, active.control.mv()]);
         }
+        loop_cells.for_each(|cells| cells.fill(f64::NAN));
         let Some(plant) = self.source.plant() else {
             plant_cells.fill(f64::NAN);
             return;

@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use rand_distr::{Distribution, StandardNormal};
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::active_loop::ActiveLoop;
 use crate::control::{ControlLoop, Law, LoopInput, PlainLoop, check_filter};
-use crate::daq::{convert, noise_of};
+use crate::daq::{Noise, convert};
 use crate::plant::{Measurement, Network, Number, Pack, Transmitter};
 use crate::session::RigCommand;
 
@@ -28,7 +25,7 @@ pub(super) struct FlockLoop {
     law: Law,
     steering: Steering,
     transmitter: Transmitter,
-    noise: Vec<Xoshiro256PlusPlus>,
+    noise: Vec<Noise>,
     /// Last PV and output.
     pub pv_cm: Pack,
     pub mv: Pack,
@@ -59,7 +56,7 @@ impl FlockLoop {
                 None => Steering::Each(vec![active.control.clone(); Pack::PLANTS]),
             },
             transmitter: Transmitter::new(&sensor.spec, converters, spec.sample_time_s),
-            noise: rigs.iter().map(|(_, seed)| noise_of(active.sensor, *seed)).collect(),
+            noise: rigs.iter().map(|(_, seed)| Noise::of_sensor(active.sensor, *seed)).collect(),
             pv_cm: Pack::of(f64::NAN),
             mv: Pack::of(input),
             pieces: [0; Pack::PLANTS],
@@ -80,7 +77,7 @@ impl FlockLoop {
     #[inline(always)]
     pub fn sample(&mut self, rigs: &[(Arc<Network>, u64)], mut level_cm: Pack, how: Measurement) -> Pack {
         if how.noise {
-            let noise = Pack::each_of(|plant| StandardNormal.sample(&mut self.noise[plant]));
+            let noise = Pack::each_of(|plant| self.noise[plant].draw());
             level_cm += noise * self.transmitter.noise_cm;
         }
         self.pv_cm = self.transmitter.show(level_cm, how).level_cm;
