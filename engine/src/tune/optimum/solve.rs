@@ -134,7 +134,7 @@ fn better(a: Found, b: Found) -> Found {
 
 /// Known gains sought afresh at their Td and some about it: far out in Td the gains that meet the limits are so few that
 /// points added meanwhile may have put them elsewhere.
-fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Candidate {
+fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Option<Candidate> {
     let mut best: Option<Candidate> = None;
     for times in [1.0, 0.96, 1.04] {
         let Lead { td_s, tf_s } = known.lead;
@@ -145,7 +145,7 @@ fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Can
             best = Some(found);
         }
     }
-    best.unwrap_or(known)
+    best
 }
 
 /// A problem with its points and workspace.
@@ -154,6 +154,8 @@ pub(super) struct Solver<'a> {
     pub search: GainSearch,
     pub wanted: Wanted,
     pub limits: LoopLimits,
+    /// Bottoms of the valleys of Td that the last look at everything came to, on its points.
+    valleys: Vec<Candidate>,
 }
 
 impl<'a> Solver<'a> {
@@ -164,7 +166,7 @@ impl<'a> Solver<'a> {
         if limits.ms > LAX_MS {
             (0..family.plants.len()).for_each(|plant| family.refine(plant));
         }
-        Self { family, search: GainSearch::default(), wanted: problem.wanted, limits }
+        Self { family, search: GainSearch::default(), wanted: problem.wanted, limits, valleys: Vec::new() }
     }
 
     /// Whether nothing in processes and limits holds the gain of a controller with derivative action.
@@ -200,6 +202,8 @@ impl<'a> Solver<'a> {
             Ok(valleys) => {
                 let mut refine = |known| self.refined(quest, filter, known, lead_search::STEP);
                 let bottoms: Vec<Found> = valleys.into_iter().map(&mut refine).collect();
+                let candidate = |found: &Found| if let Found::Best(c) = found { Some(*c) } else { None };
+                self.valleys = bottoms.iter().filter_map(candidate).collect();
                 bottoms.into_iter().reduce(better).unwrap_or(Found::Nothing)
             }
             Err(other) => other,
@@ -214,12 +218,12 @@ impl<'a> Solver<'a> {
     /// About known gains, on the points that bear on them and on those that turn out to.
     fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, step: f64) -> Found {
         let all = &self.family.points;
-        let held = quest.limits.ju.is_finite() && quest.relax.is_none();
         let mut points = all.near(&quest.limits_at(&known), known.lead, known.kp, known.ki);
         let whole = quest.on(&self.family, all);
         let stays = |c: Candidate| c.value <= known.value + LOST * known.value.abs();
-        let kept = !held || self.search.at_gain(&whole, known.lead, known.kp).is_some_and(stays);
-        let known = if kept { known } else { afresh(&mut self.search, &whole, known) };
+        let again = self.search.at_gain(&whole, known.lead, known.kp).filter(|c| stays(*c));
+        let again = again.or_else(|| afresh(&mut self.search, &whole, known));
+        let known = again.unwrap_or(known);
         let mut best: Option<Candidate> = None;
         for trial in 0..TRIALS {
             let on = Ground { points: &points, ..whole };
@@ -241,7 +245,11 @@ impl<'a> Solver<'a> {
             }
             points.extend(&all.near(&quest.limits_at(&found), found.lead, found.kp, found.ki));
         }
-        best.map_or(Found::Best(known), Found::Best)
+        // What a walk on few points came to may be worth less on all of them than where it began.
+        match (best, again) {
+            (Some(best), Some(again)) if best.value > again.value => Found::Best(again),
+            _ => best.or(again).map_or(Found::Best(known), Found::Best),
+        }
     }
 
     /// Where the loop of a candidate comes nearest to −1, in rad/s.
@@ -310,14 +318,37 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// The same by one search, which may end in a valley that is not the deepest.
+    /// The same from the deepest valley that the first look sees, and from others where it comes to less than they
+    /// promise: on all points a valley may be worth less than on the first ones, or too narrow to stay in.
     fn sought(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
+        self.valleys.clear();
+        let Some(mut best) = self.pursued(objective, None)? else { return Ok(None) };
+        let value = |o: &Optimum| if objective == Objective::Jv { o.value } else { -o.value };
+        let mut valleys = std::mem::take(&mut self.valleys);
+        valleys.sort_by(|a, b| a.value.total_cmp(&b.value));
+        for valley in valleys {
+            let promises = |best: &Optimum| valley.value < value(best) - LOST * value(best).abs();
+            if !promises(&best) {
+                break;
+            }
+            let found = self.pursued(objective, Some(valley)).ok().flatten();
+            best = found.filter(|found| value(found) < value(&best)).unwrap_or(best);
+        }
+        Ok(Some(best))
+    }
+
+    /// The same by one search, from known gains or without a start.
+    fn pursued(
+        &mut self,
+        objective: Objective,
+        start: Option<Candidate>,
+    ) -> Result<Option<Optimum>, OptimumError> {
         // Two integrators in the loop: ∫ ln|T|/ω² dω ≥ 0, so |T| passes 1 somewhere.
         let integrates = self.family.plants.iter().any(|p| p.low.power < 0);
         if integrates && self.limits.mt <= 1.0 + LEAST_MT {
             return Ok(None);
         }
-        let mut known: Option<Candidate> = None;
+        let mut known = start;
         let mut excess = f64::INFINITY;
         let quest = Quest { objective, limits: self.limits, relax: None };
         // The best that all but met the limits: a deep valley may be too narrow to follow from round to round.

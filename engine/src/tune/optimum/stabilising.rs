@@ -17,6 +17,8 @@ use super::problem::Process;
 use super::slice::{Lead, Shaped};
 use crate::analyze::{OpenLoop, unstable_loop_poles};
 
+/// Turn of a dead time between two points, in rad, up to which a crossing between them is told.
+const RESOLVED_RAD: f64 = 1.6;
 /// Gain Ki, relative to Kp times a frequency of the process, that stands for Ki → 0.
 const SMALL: f64 = 1e-6;
 /// Intervals of Kp that are looked at; those beyond belong to ripples.
@@ -168,6 +170,8 @@ pub(super) struct OverKi {
     crossings: Vec<(usize, f64, i32)>,
     /// Plants whose points do not tell.
     unknown: Vec<usize>,
+    /// Whether some have crossings beyond the points that follow them.
+    cut: bool,
     lead: Option<Lead>,
     /// F at every point with this lead.
     f_re: Vec<f64>,
@@ -180,6 +184,7 @@ impl OverKi {
     pub fn at(&mut self, family: &Family<'_>, lead: Lead, kp: f64) {
         self.crossings.clear();
         self.unknown.clear();
+        self.cut = false;
         if self.lead != Some(lead) || self.f_re.len() != family.points.len() {
             let shaped = Shaped::new(&family.points, lead);
             (self.f_re, self.f_im) = (shaped.f_re, shaped.f_im);
@@ -205,7 +210,13 @@ impl OverKi {
         };
         let own = family.own_points(plant);
         let mut before = f64::NAN;
+        // Beyond the points that follow its turns a dead time has any number of crossings between two of them.
+        let resolved = RESOLVED_RAD / family.plants[plant].dead_time_s;
         for i in own.clone() {
+            if i > own.start && points.omega[i] - points.omega[i - 1] > resolved {
+                self.cut = true;
+                break;
+            }
             let now = points.inverse_re[i] + kp * self.f_re[i];
             if i > own.start && (before > 0.0) != (now > 0.0) {
                 let [(r_before, ki_before), (r, ki)] = [i - 1, i].map(at_point);
@@ -227,7 +238,7 @@ impl OverKi {
         let counted = |plant: usize| self.unknown.contains(&plant) || count(plant) == 0;
         // Crossings between two points are not counted: where the points turned out too far apart, or a lax limit lets loops
         // come close to −1, what is called stable is tested.
-        let test = !self.unknown.is_empty() || family.is_refined();
+        let test = self.cut || !self.unknown.is_empty() || family.is_refined();
         (0..family.plants.len()).all(counted) && (!test || family.is_stable(lead, self.kp, ki))
     }
 }
