@@ -194,3 +194,43 @@ fn weights_and_offsets_show_where_theory_puts_them() {
         step_response(&model, &PidGains::p(50.0), Excitation::Setpoint, &ResponseOptions::default());
     assert_eq!(runaway.end, ResponseEnd::Diverged);
 }
+
+/// A slow mode too small to be seen was dropped with all the error it holds: with two integrators in the loop ∫ e dt = 0, so
+/// the IAE of a setpoint step is twice its positive part. Without the end 5.37 s came out for Ti = 10⁶ s, where y crosses the
+/// setpoint only at the very end of the fast part: ∫ to there is the 5.367 s of Kc alone, and twice that 10.73 s.
+#[test]
+fn the_slow_end_of_an_integrating_loop_counts() {
+    let model = ProcessModel::Ipdt(Ipdt::new(0.03, 2.0).expect("a model"));
+    let of = |ti: f64| {
+        let gains = PidGains::pi(6.211, ti);
+        step_figures(&model, &gains, &analyze(&model, &gains)).iae_setpoint.expect("it settles")
+    };
+    let options = ResponseOptions { horizon_s: Some(400.0), ..ResponseOptions::default() };
+    let alone = step_response(&model, &PidGains::p(6.211), Excitation::Setpoint, &options);
+    assert!((alone.iae / 5.367 - 1.0).abs() < 1e-3, "{}", alone.iae);
+    for ti in [1e4, 1e5, 1e6, 1e9] {
+        let iae = of(ti);
+        assert!((iae / (2.0 * alone.iae) - 1.0).abs() < 2e-3, "{ti}: {iae}");
+    }
+    let mut before = 0.0;
+    for ti in [20.0, 50.0, 100.0, 1e3, 1e4, 1e5, 1e6] {
+        let iae = of(ti);
+        assert!(iae > before, "{ti}: {iae} after {before}");
+        before = iae;
+    }
+}
+
+/// y jumps with a process of as many zeros as poles: a trapezoid over the jump made 2.0115 and 1.9943 of the first.
+#[test]
+fn a_jump_of_y_is_not_a_ramp() {
+    // Without overshoot IAE = IE = Ti/Kc for the load, Ti/(K Kc) for the setpoint.
+    for (num, den, kc, ti) in [(vec![1.0], vec![1.0], 0.5, 1.0), (vec![0.5, 1.0], vec![2.0, 1.0], 0.6, 2.0)] {
+        let model = ProcessModel::rational(&num, &den, 1.0).expect("a model");
+        let gains = PidGains::pi(kc, ti);
+        let figures = step_figures(&model, &gains, &analyze(&model, &gains));
+        for iae in [figures.iae_load, figures.iae_setpoint] {
+            let off = iae.expect("it settles") / (ti / kc) - 1.0;
+            assert!(off.abs() < 1e-4, "{num:?}: {iae:?} {off:e}");
+        }
+    }
+}

@@ -1,8 +1,8 @@
 //! The IAE of a loop alone, for searches that ask for it a thousand times.
 //!
-//! What [`loop_response`](super::loop_response) keeps of every sample is left out, and the cubics between the samples are
-//! integrated themselves, so that the steps may be longer. What an error that only creeps back leaves is not waited for: with
-//! integral action ∫ e dt is known beforehand. Within 1e-4 of the figure of the response, as the tests hold it.
+//! What [`loop_response`](super::loop_response) keeps of every sample is left out, and the steps may be longer. Within 1e-4 of
+//! the figure of the response, as the tests hold it. Both integrate the cubics between the samples themselves, and neither
+//! waits for an error that only creeps back: with integral action ∫ e dt is known beforehand, and so is what is left of it.
 
 use super::OpenLoop;
 use super::closed_loop::{Inputs, Stepper};
@@ -23,11 +23,12 @@ const UNSEEN_PHASE_RAD: f64 = 0.01;
 /// above: as a response has it.
 const SETTLED: f64 = 1e-5;
 const OUTLAST: f64 = 1.25;
-/// The error creeps when it has fallen under this share of its largest and kept falling for so many radians of the first
-/// unit crossing and so many dead times.
-const CREEPING: f64 = 0.005;
+/// The error creeps when it has kept falling for so many radians of the first unit crossing and so many dead times …
 const QUIET_RAD: f64 = 9.0;
 const QUIET_DEAD_TIMES: f64 = 2.0;
+/// … and along one exponential, whose rate ∫ e dt gives too: the two may differ by so much of the IAE, or by rounding.
+const CREEPING: f64 = 3e-5;
+const CREEPING_ROUNDING: f64 = 1e-9;
 /// Most steps, and those after which a loop without dead time is run again with steps four times as long.
 const MOST_STEPS: u32 = 1_000_000;
 const STEPS_BEFORE_COARSER: u32 = 20_000;
@@ -39,19 +40,13 @@ pub(crate) fn quick_iae(open: &OpenLoop, excitation: Excitation) -> Option<f64> 
     if !is_stable(open, &crossings) || open.controller_low().power >= 0 {
         return None;
     }
-    let ki = open.controller_low().coefficient;
-    // lim s→0 of e(s): of a setpoint 1/(G C s), of a load −1/(C s).
-    let (inputs, whole) = match (excitation, open.process_low()) {
-        (Excitation::Load, _) => (Inputs { r: 0.0, b: 1.0, c: 0.0, load: 1.0 }, -1.0 / ki),
-        (_, low) => {
-            let whole = if low.power == 0 { 1.0 / (low.coefficient * ki) } else { 0.0 };
-            (Inputs { r: 1.0, b: 1.0, c: 0.0, load: 0.0 }, whole)
-        }
+    let inputs = match excitation {
+        Excitation::Load => Inputs { r: 0.0, b: 1.0, c: 0.0, load: 1.0 },
+        Excitation::Setpoint => Inputs { r: 1.0, b: 1.0, c: 0.0, load: 0.0 },
     };
     let last_crossing = crossings.last().map_or_else(|| typical_omega(open), |c| c.omega);
-    let first_crossing = crossings.first().map_or(last_crossing, |c| c.omega);
-    let quiet_s = QUIET_RAD / first_crossing + QUIET_DEAD_TIMES * open.dead_time_s;
-    let course = Course { goal: inputs.r, whole, dead_time_s: open.dead_time_s, quiet_s };
+    let sums = ErrorSums::new(open, inputs, crossings.first().map_or(last_crossing, |c| c.omega));
+    let course = Course { goal: inputs.r, dead_time_s: open.dead_time_s, sums };
     let moduli = || open.poles.iter().map(|p| p.norm());
     let of_poles_s = POLE_STEP_RAD / moduli().fold(0.0, f64::max);
     if open.dead_time_s > 0.0 {
@@ -74,14 +69,96 @@ pub(crate) fn quick_iae(open: &OpenLoop, excitation: Excitation) -> Option<f64> 
     None
 }
 
-/// What is known of an error before it is computed.
+/// ∫ e dt and ∫ |e| dt as they grow, e = r − y.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ErrorSums {
+    /// ∫ e dt so far, in PV units times seconds.
+    pub ie: f64,
+    /// ∫ |e| dt so far.
+    pub iae: f64,
+    /// ∫ e dt to the end of time, where it is known.
+    whole: Option<f64>,
+    quiet_s: f64,
+    /// Since when |e| has been falling without a zero, and a time and an error since then.
+    falls_since_s: f64,
+    mark: Option<(f64, f64)>,
+}
+
+impl ErrorSums {
+    /// Of a stable loop under these inputs; the first unit crossing in rad/s.
+    pub(super) fn new(open: &OpenLoop, inputs: Inputs, first_crossing: f64) -> Self {
+        Self {
+            quiet_s: QUIET_RAD / first_crossing + QUIET_DEAD_TIMES * open.dead_time_s,
+            whole: whole_error(open, inputs),
+            ..Self::plain()
+        }
+    }
+
+    /// Of a loop of which nothing is known beforehand.
+    pub(super) fn plain() -> Self {
+        Self { ie: 0.0, iae: 0.0, whole: None, quiet_s: f64::INFINITY, falls_since_s: 0.0, mark: None }
+    }
+
+    /// Takes in the error over a step of h that starts at t.
+    pub(super) fn add(&mut self, error: Hermite, t: f64, h: f64) {
+        let (whole, absolute) = integrals(error, h);
+        (self.ie, self.iae) = (self.ie + whole, self.iae + absolute);
+        if error.start * error.end <= 0.0 || error.end.abs() >= error.start.abs() {
+            (self.falls_since_s, self.mark) = (t + h, None);
+        }
+    }
+
+    /// Adds all that comes after now, where the error is down to rounding or what is left of it keeps its sign: a slow mode
+    /// too small to be seen may hold as much of the IAE as all before it.
+    pub(super) fn close(&mut self) {
+        if let Some(whole) = self.whole {
+            self.iae += (whole - self.ie).abs();
+            self.ie = whole;
+        }
+    }
+
+    /// Whether the error only creeps back from what it is at t: along one exponential, without another zero.
+    pub(super) fn creeps(&mut self, error: f64, t: f64) -> bool {
+        let Some(whole) = self.whole else { return false };
+        let falling_s = t - self.falls_since_s;
+        let Some((mark_s, mark)) = self.mark else {
+            if falling_s >= 0.5 * self.quiet_s {
+                self.mark = Some((t, error));
+            }
+            return false;
+        };
+        let since_s = t - mark_s;
+        if since_s < 0.5 * self.quiet_s {
+            return false;
+        }
+        self.mark = Some((t, error));
+        let rest = whole - self.ie;
+        if rest * error <= 0.0 {
+            return false;
+        }
+        let (seen, expected) = ((mark / error).ln(), error / rest * since_s);
+        let allowed = CREEPING * self.iae / rest.abs() * expected;
+        (seen - expected).abs() <= allowed + CREEPING_ROUNDING
+    }
+}
+
+/// ∫ e dt to the end of time of a stable loop with integral action: u = Kp (b r − y) + Ki ∫ e has to come to rest where
+/// G(0) u = r − G(0) · load; `None` without.
+fn whole_error(open: &OpenLoop, inputs: Inputs) -> Option<f64> {
+    let (controller, process) = (open.controller_low(), open.process_low());
+    if controller.power >= 0 || process.power > 0 {
+        return None;
+    }
+    let Inputs { r, b, load, .. } = inputs;
+    let holding = if process.power == 0 { r / process.coefficient } else { 0.0 };
+    Some((holding - load - open.gains().kp * (b - 1.0) * r) / controller.coefficient)
+}
+
+/// A run for the IAE alone.
 struct Course {
     goal: f64,
-    /// ∫ e dt to the end of time.
-    whole: f64,
     dead_time_s: f64,
-    /// How long it falls before it is taken to creep.
-    quiet_s: f64,
+    sums: ErrorSums,
 }
 
 impl Course {
@@ -89,17 +166,11 @@ impl Course {
     fn iae(&self, mut stepper: Stepper, most_steps: u32) -> Option<f64> {
         let h = stepper.h();
         let shortest_s = 3.0 * self.dead_time_s + 50.0 * h;
-        let (mut iae, mut ie) = (0.0, 0.0);
-        let (mut largest, mut last_outside_s, mut falls_since_s) = (0.0f64, 0.0, 0.0);
+        let mut sums = self.sums;
+        let (mut largest, mut last_outside_s) = (0.0f64, 0.0);
         for k in 0..most_steps {
             let t = f64::from(k) * h;
-            let arc = stepper.arc();
-            let error = Hermite {
-                start: self.goal - arc.start,
-                end: self.goal - arc.end,
-                start_slope: -arc.start_slope,
-                end_slope: -arc.end_slope,
-            };
+            let error = error_of(stepper.step().0, self.goal);
             let now = error.start.abs();
             if !now.is_finite() {
                 return None;
@@ -108,38 +179,20 @@ impl Course {
             if now > SETTLED * largest {
                 last_outside_s = t;
             }
-            if t >= shortest_s {
-                if t >= OUTLAST * last_outside_s + 4.0 * self.dead_time_s {
-                    return Some(iae);
-                }
-                let creeps = now < CREEPING * largest && t - falls_since_s >= self.quiet_s;
-                if creeps && let Some(rest) = self.rest(self.whole - ie, error.start, largest, t) {
-                    return Some(iae + rest);
-                }
+            let settled = t >= OUTLAST * last_outside_s + 4.0 * self.dead_time_s;
+            if t >= shortest_s && (settled || sums.creeps(error.start, t)) {
+                sums.close();
+                return Some(sums.iae);
             }
-            let (whole, absolute) = integrals(error, h);
-            (ie, iae) = (ie + whole, iae + absolute);
-            if error.start * error.end <= 0.0 || error.end.abs() >= now {
-                falls_since_s = t + h;
-            }
+            sums.add(error, t, h);
         }
         None
     }
 }
 
-impl Course {
-    /// What an error that creeps adds until a response would end, from all of it; `None` where it has the other sign, and so
-    /// comes after another zero, or where the error has settled already.
-    fn rest(&self, rest: f64, error: f64, largest: f64, t: f64) -> Option<f64> {
-        let visible = error.abs() / (SETTLED * largest);
-        if rest * error <= 0.0 || visible <= 1.0 {
-            return None;
-        }
-        let rate = error / rest;
-        let settled_s = t + visible.ln() / rate;
-        let beyond_s = (OUTLAST - 1.0) * settled_s + 4.0 * self.dead_time_s;
-        Some(rest.abs() * (1.0 - (-rate * beyond_s).exp() / visible))
-    }
+/// r − y over a step.
+pub(super) fn error_of(y: Hermite, r: f64) -> Hermite {
+    Hermite { start: r - y.start, end: r - y.end, start_slope: -y.start_slope, end_slope: -y.end_slope }
 }
 
 /// ∫ e and ∫ |e| over a step, the latter cut at its zero where the ends differ in sign.

@@ -42,21 +42,11 @@ impl Stepper {
         }
     }
 
-    pub(super) fn step(&mut self) -> (f64, f64) {
+    /// y over the step, and u where it starts.
+    pub(super) fn step(&mut self) -> (Hermite, f64) {
         match self {
-            Self::Delayed(l) => {
-                let (y, u) = l.step();
-                (y.start, u)
-            }
+            Self::Delayed(l) => l.step(),
             Self::Direct(l) => l.step(),
-        }
-    }
-
-    /// As [`Self::step`]: y over the step.
-    pub(super) fn arc(&mut self) -> Hermite {
-        match self {
-            Self::Delayed(l) => l.step().0,
-            Self::Direct(l) => l.arc(),
         }
     }
 }
@@ -209,18 +199,13 @@ impl Direct {
         Self { h, step: Step::new(&system, 0.0, h), z, y_row, u_row, slope_row }
     }
 
-    fn step(&mut self) -> (f64, f64) {
-        let sample = (self.y_row.dot(&self.z), self.u_row.dot(&self.z));
-        self.step.advance(&mut self.z, Hermite::default());
-        sample
-    }
-
-    fn arc(&mut self) -> Hermite {
+    fn step(&mut self) -> (Hermite, f64) {
         let at = |of: &Self| (of.y_row.dot(&of.z), of.slope_row.dot(&of.z));
         let (start, start_slope) = at(self);
+        let u = self.u_row.dot(&self.z);
         self.step.advance(&mut self.z, Hermite::default());
         let (end, end_slope) = at(self);
-        Hermite { start, end, start_slope, end_slope }
+        (Hermite { start, end, start_slope, end_slope }, u)
     }
 }
 
@@ -240,7 +225,7 @@ mod tests {
         (0..steps).for_each(|_| {
             stepper.step();
         });
-        stepper.step().0
+        stepper.step().0.start
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Time responses of the linear closed loop to a unit step of the setpoint or of a load at the process input.
 
+use super::absolute_error::{ErrorSums, error_of};
 use super::closed_loop::{Inputs, Stepper};
 use super::metrics::{Excitation, Metrics, MetricsError, metrics_about};
 use super::stability::{gain_crossings, is_stable, typical_omega};
@@ -60,17 +61,25 @@ pub struct Response {
     pub u: Vec<f64>,
     /// Where y comes to rest; `None` for an unstable loop.
     pub final_value: Option<f64>,
+    /// ∫ (r − y) dt in PV units times seconds, of every step that was computed; of a response that was let settle with
+    /// integral action to the end of time.
+    pub ie: f64,
+    /// ∫ |r − y| dt likewise.
+    pub iae: f64,
     /// Why it ends.
     pub end: ResponseEnd,
 }
 
 impl Response {
-    /// Performance figures of this response, overshoot and settling about the value where it truly comes to rest.
+    /// Performance figures of this response, overshoot and settling about the value where it truly comes to rest; IE and IAE
+    /// are [`Self::ie`] and [`Self::iae`], which neither a jump between two samples nor a slow end spoils.
     ///
     /// # Errors
     /// [`MetricsError`] for a response cut off before its second sample.
     pub fn metrics(&self) -> Result<Metrics, MetricsError> {
-        metrics_about(&self.time_s, &self.r, &self.y, &self.u, self.excitation, self.final_value)
+        let sampled =
+            metrics_about(&self.time_s, &self.r, &self.y, &self.u, self.excitation, self.final_value)?;
+        Ok(Metrics { ie: self.ie, iae: self.iae, ..sampled })
     }
 }
 
@@ -122,8 +131,14 @@ pub fn loop_response(open: &OpenLoop, excitation: Excitation, options: &Response
     let last_crossing = crossings.last().map_or_else(|| typical_omega(open), |c| c.omega);
     let unstable_length = UNSTABLE_LENGTH
         * (crossings.first().map_or(1.0 / last_crossing, |c| 1.0 / c.omega)).max(open.dead_time_s);
+    let open_ended = stable && options.horizon_s.is_none();
     let run = Run {
         inputs,
+        sums: if open_ended {
+            ErrorSums::new(open, inputs, crossings.first().map_or(last_crossing, |c| c.omega))
+        } else {
+            ErrorSums::plain()
+        },
         goal,
         horizon_s: options.horizon_s.or((!stable).then_some(unstable_length)),
         bound: (!stable).then_some(DIVERGED * open.process_low().coefficient.abs().max(1.0)),
@@ -138,11 +153,17 @@ pub fn loop_response(open: &OpenLoop, excitation: Excitation, options: &Response
         let h = (CROSSING_STEP_RAD / last_crossing)
             .min(POLE_STEP_RAD / fastest_pole)
             .min((open.dead_time_s / STEPS_PER_DEAD_TIME).max(UNSEEN_PHASE_RAD / moving));
-        return run.through(Stepper::new(open, inputs, h), MOST_STEPS);
+        return run.through(Stepper::new(open, inputs, h), MOST_STEPS).0;
     }
     let mut h = CROSSING_STEP_RAD / last_crossing;
+    let mut finest: Option<(f64, f64)> = None;
     loop {
-        let response = run.through(Stepper::new(open, inputs, h), STEPS_BEFORE_COARSER);
+        let (mut response, closed) = run.through(Stepper::new(open, inputs, h), STEPS_BEFORE_COARSER);
+        // A slow end needs long steps to be seen, what comes before it short ones.
+        finest = finest.or(closed.then_some((response.ie, response.iae)));
+        if let Some((ie, iae)) = finest {
+            (response.ie, response.iae) = (ie, iae);
+        }
         let complete = response.end != ResponseEnd::Horizon
             || run.horizon_s.is_some_and(|t| h * STEPS_BEFORE_COARSER as f64 >= t);
         if complete || h * last_crossing > f64::from(u16::MAX) {
@@ -169,6 +190,7 @@ fn final_value(open: &OpenLoop, inputs: Inputs) -> f64 {
 
 struct Run {
     inputs: Inputs,
+    sums: ErrorSums,
     goal: f64,
     horizon_s: Option<f64>,
     bound: Option<f64>,
@@ -178,16 +200,19 @@ struct Run {
 }
 
 impl Run {
-    fn through(&self, mut stepper: Stepper, most_steps: usize) -> Response {
+    /// The response, and whether its integrals reach to the end of time.
+    fn through(&self, mut stepper: Stepper, most_steps: usize) -> (Response, bool) {
         let h = stepper.h();
         let dead_time = if let Stepper::Delayed(loop_) = &stepper { loop_.dead_time_s() } else { 0.0 };
         let shortest = 3.0 * dead_time + 50.0 * h;
         let (mut time_s, mut y, mut u) = (Vec::new(), Vec::new(), Vec::new());
         let (mut stride, mut largest, mut last_outside) = (1usize, 0.0f64, 0.0f64);
         let mut end = ResponseEnd::Horizon;
+        let (mut sums, mut closed) = (self.sums, false);
         for k in 0..most_steps {
             let t = k as f64 * h;
-            let (y_now, u_now) = stepper.step();
+            let (arc, u_now) = stepper.step();
+            let y_now = arc.start;
             if k % stride == 0 {
                 if time_s.len() == self.most_points {
                     for column in [&mut time_s, &mut y, &mut u] {
@@ -218,17 +243,32 @@ impl Run {
                 }
                 _ => {}
             }
+            let error = error_of(arc, self.inputs.r);
+            if !closed && t >= shortest && sums.creeps(error.start, t) {
+                sums.close();
+                closed = true;
+            }
+            if !closed {
+                sums.add(error, t, h);
+            }
+        }
+        if !closed && end == ResponseEnd::Settled {
+            sums.close();
+            closed = true;
         }
         let r = vec![self.inputs.r; time_s.len()];
-        Response {
+        let response = Response {
             excitation: self.excitation,
             time_s,
             r,
             y,
             u,
             final_value: self.bound.is_none().then_some(self.goal),
+            ie: sums.ie,
+            iae: sums.iae,
             end,
-        }
+        };
+        (response, closed)
     }
 }
 

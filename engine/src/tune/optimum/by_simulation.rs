@@ -12,6 +12,11 @@ use super::slice::Lead;
 use super::solve::Solver;
 use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_response, quick_iae};
 
+/// How much a derivative must gain to be proposed at all, and as much where its filter's phase at the frequency at which the
+/// loop comes nearest to −1 passes that many radians.
+const WORTH_OF_DERIVATIVE: f64 = 0.002;
+const WORTH_OF_DISGUISE: f64 = 0.01;
+const SLOW_FILTER_RAD: f64 = 100.0;
 /// Rounds of exact checks of the result.
 const ROUNDS: usize = 20;
 /// Shares of the largest Ki at which searches start.
@@ -37,6 +42,9 @@ const KP_HALVINGS: u32 = 12;
 const MOST_WORST: usize = 6;
 const SAME: f64 = 1e-4;
 const SIMPLEX: Simplex = Simplex { step: 0.2, last_step: 2e-5, most_evaluations: 160 };
+/// Ki of a pure integrator, and Kp Ki⁻¹ of the start beside it in units of 1/ω.
+const OF_KI: Simplex = Simplex { step: 0.2, last_step: 2e-5, most_evaluations: 60 };
+const BESIDE_INTEGRATOR: f64 = 0.1;
 /// Once more about the best of all, since a simplex can get stuck on an edge that limits make.
 const AGAIN: Simplex = Simplex { step: 0.05, last_step: 2e-5, most_evaluations: 100 };
 
@@ -45,6 +53,7 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
     let wanted = solver.wanted;
     let start = solver.solve(Objective::Jv)?;
     let mut best = valued(solver, objective, start.clone());
+    let mut without: Option<Optimum> = None;
     let mut take = |found: Option<Optimum>| {
         if let Some(found) = found.filter(|f| f.value < best.value) {
             best = found;
@@ -56,10 +65,26 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
         let simple = solver.solve(Objective::Jv);
         let found = simple.ok().and_then(|simple| searched(solver, objective, &simple));
         solver.wanted = wanted;
+        without.clone_from(&found);
         take(found);
     }
     take(searched(solver, objective, &start));
-    Ok(best)
+    Ok(match without {
+        Some(without) if simpler_does(solver, &best, &without) => without,
+        _ => best,
+    })
+}
+
+/// Whether a PI is to be preferred to a PID that gains next to nothing in an objective that is to be small; more is wanted of
+/// one whose filter is so slow that its derivative is proportional action at every frequency that matters, with a Td and a
+/// Kp that mean nothing.
+fn simpler_does(solver: &Solver<'_>, with: &Optimum, without: &Optimum) -> bool {
+    let lead = lead_of(with);
+    let sign = solver.family.sign;
+    let candidate = Candidate { lead, kp: sign * with.gains.kp, ki: sign * with.gains.ki, value: 0.0 };
+    let disguised = lead.tf_s * solver.nearest_omega(&candidate) > SLOW_FILTER_RAD;
+    let worth = if disguised { WORTH_OF_DISGUISE } else { WORTH_OF_DERIVATIVE };
+    lead.td_s > 0.0 && without.value <= with.value * (1.0 + worth)
 }
 
 /// An optimum for another objective with its IAE.
@@ -79,31 +104,62 @@ fn lead_of(found: &Optimum) -> Lead {
     }
 }
 
-/// The best that simplexes from some shares of the largest Ki come to, certified; `None` for a pure integrator, which leaves
-/// nothing but Ki to choose, and where the exact analysis does not confirm it.
-fn searched(solver: &mut Solver<'_>, objective: Objective, start: &Optimum) -> Option<Optimum> {
-    let kp = solver.family.sign * start.gains.kp;
-    if kp == 0.0 {
-        return None;
+/// The best Ki of a pure integrator, and the best about a little Kp beside it.
+fn from_integrator(solver: &mut Solver<'_>, objective: Objective) -> Option<Optimum> {
+    let limits = solver.limits;
+    let largest = solver.at_gain(Objective::MaxKi, &limits, Lead::NONE, 0.0)?;
+    let everything: Vec<usize> = (0..solver.family.plants.len()).collect();
+    let mut best = Candidate { value: f64::INFINITY, ..largest };
+    for share in START_SHARES {
+        let mut value = |x: &[f64]| {
+            let candidate = Candidate { ki: largest.ki * x[0].exp().min(1.0), ..largest };
+            let value = worst(solver, objective, &candidate, &everything).1;
+            if value < best.value {
+                best = Candidate { value, ..candidate };
+            }
+            value
+        };
+        minimise(&OF_KI, &[share.ln()], &mut value);
     }
-    let lead = lead_of(start);
+    let alone = best.value.is_finite().then(|| certified(solver, objective, best).ok()).flatten();
+    let kp = BESIDE_INTEGRATOR * best.ki / solver.nearest_omega(&best);
+    let beside = searched_from(solver, objective, &Candidate { kp, ..best });
+    match (alone, beside) {
+        (Some(alone), Some(beside)) if beside.value < alone.value => Some(beside),
+        (alone, beside) => alone.or(beside),
+    }
+}
+
+/// The best that simplexes from some shares of the largest Ki come to, certified; `None` where the exact analysis does not
+/// confirm it.
+fn searched(solver: &mut Solver<'_>, objective: Objective, start: &Optimum) -> Option<Optimum> {
+    let sign = solver.family.sign;
+    let kp = sign * start.gains.kp;
+    if kp == 0.0 {
+        return from_integrator(solver, objective);
+    }
+    let start = Candidate { lead: lead_of(start), kp, ki: sign * start.gains.ki, value: 0.0 };
+    searched_from(solver, objective, &start)
+}
+
+fn searched_from(solver: &mut Solver<'_>, objective: Objective, at_start: &Candidate) -> Option<Optimum> {
+    let lead = at_start.lead;
     let filter = match solver.wanted {
         Wanted::Pid(filter) if lead.td_s > 0.0 => Some(filter),
         _ => None,
     };
     // Of many processes a few are ever the worst: only these are simulated, and all for what comes of it.
-    let at_start = Candidate { lead, kp, ki: solver.family.sign * start.gains.ki, value: 0.0 };
     let everything: Vec<usize> = (0..solver.family.plants.len()).collect();
-    let mut plants = vec![worst(solver, objective, &at_start, &everything).0];
+    let mut plants = vec![worst(solver, objective, at_start, &everything).0];
     for _ in 0..MOST_WORST {
-        let best = searched_among(solver, objective, &at_start, filter, &plants)?;
+        let best = searched_among(solver, objective, at_start, filter, &plants)?;
         let (index, value) = worst(solver, objective, &best, &everything);
         if value <= best.value * (1.0 + SAME) || plants.contains(&index) {
             return confirmed(solver, objective, filter, best, &plants);
         }
         plants.push(index);
     }
-    let best = searched_among(solver, objective, &at_start, filter, &everything)?;
+    let best = searched_among(solver, objective, at_start, filter, &everything)?;
     confirmed(solver, objective, filter, best, &everything)
 }
 
