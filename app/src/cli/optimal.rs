@@ -265,6 +265,7 @@ fn refusal(as_json: bool, processes: &[Process], question: &Question, error: &Op
     to.insert("active".into(), json!([]));
     let mut floor = Map::new();
     if let OptimumError::Infeasible { limit, floor: value, .. }
+    | OptimumError::InfeasibleAtFilter { limit, floor: value, .. }
     | OptimumError::InfeasibleTogether { limit, floor: value, .. } = error
     {
         floor.insert(limit.to_string(), json!(value));
