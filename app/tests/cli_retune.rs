@@ -299,3 +299,16 @@ fn a_folder_is_ranked_and_one_bad_log_stops_no_other() {
     assert_eq!(vasos(&["retune", &at, "--json", "--jobs", "1"]).stdout, output.stdout);
     assert_eq!(vasos(&["retune", &reports.display().to_string()]).status.code(), Some(2));
 }
+
+/// The exit status was 0 where every log was unreadable or told no tuning.
+#[test]
+fn a_folder_without_one_answer_is_a_no() {
+    let folder = scratch("folder_no");
+    std::fs::write(folder.join("broken.csv"), "nothing\n").expect("a file");
+    let at = folder.display().to_string();
+    assert_eq!(vasos(&["retune", &at]).status.code(), Some(1));
+    Loop { setpoint: |_| 50.0, ..Loop::moved(1.0, 90.0) }.write(&folder.join("still.csv"));
+    assert_eq!(vasos(&["retune", &at, "--json"]).status.code(), Some(1));
+    Loop::moved(1.0, 90.0).write(&folder.join("sluggish.csv"));
+    assert_eq!(vasos(&["retune", &at]).status.code(), Some(0));
+}

@@ -1,18 +1,18 @@
 //! `vasos analyze`: what a controller is worth on a model.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{Analysis, StepFigures, analyze, analyze_measured, step_figures};
-use vasos_engine::control::ParallelGains;
+use vasos_engine::analyze::{Analysis, OpenLoop, StepFigures, analyze_loop, analyze_measured, loop_figures};
+use vasos_engine::control::FormGains;
 use vasos_engine::tune::ControllerKind;
 use vasos_io::frequency_response::read_frequency_response;
 
 use super::json::{self, shown, table};
-use super::{Answer, Refusal, parse};
+use super::{Answer, Refusal, optimal, parse};
 
 /// Arguments of `vasos analyze`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=7,Ti=15,Td=1,N=10 --json"
+    after_help = "Examples:\n  vasos analyze --model K=4.9,T=152,L=2 --gains Kc=7,Ti=15,Td=1,N=10 --json\n  vasos analyze --model K=1,T=1,L=5 --gains Kp=0,Ki=0.08"
 )]
 pub struct Arguments {
     /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..
@@ -22,7 +22,8 @@ pub struct Arguments {
     /// --json prints.
     #[arg(long, value_name = "FILE", conflicts_with = "model")]
     response: Option<std::path::PathBuf>,
-    /// Gains of the ideal form: Kc=..[,Ti=..][,Td=..][,N=..]; without Ti no integral action, N is 10.
+    /// Gains of the ideal form: Kc=..[,Ti=..][,Td=..][,N=..], without Ti no integral action, N is 10; or of the parallel
+    /// form: Kp=..,Ki=..[,Kd=..,Tf=..], where Kp may be 0.
     #[arg(long, allow_hyphen_values = true)]
     gains: String,
     /// Print JSON.
@@ -31,25 +32,32 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
-    let gains = parse::gains(&arguments.gains).map_err(Refusal::of)?;
+    let gains = parse::any_gains(&arguments.gains).map_err(Refusal::of)?;
+    let mut unseen = None;
     let (described, analysis, figures) = match (&arguments.model, &arguments.response) {
         (Some(model), _) => {
             let model = parse::model(model).map_err(Refusal::of)?;
-            let analysis = analyze(&model, &gains);
-            (json::model(&model), analysis, step_figures(&model, &gains, &analysis))
+            let open = OpenLoop::of_parallel(&model, &gains);
+            let analysis = analyze_loop(&open);
+            (json::model(&model), analysis, loop_figures(&open, &analysis))
         }
         (None, Some(path)) => {
             let response = read_frequency_response(path).map_err(Refusal::of)?;
-            let parallel = ParallelGains::from(gains);
-            let analysis = analyze_measured(&response, &parallel).map_err(Refusal::of)?;
+            let analysis = analyze_measured(&response, &gains).map_err(Refusal::of)?;
+            unseen = optimal::coarse(&response, &gains);
             (json::response(&response), analysis, StepFigures::default())
         }
         (None, None) => return Err(Refusal("give --model or --response".to_owned())),
     };
-    let remarks = remarks(&analysis, &figures, arguments.model.is_some());
+    let mut remarks = remarks(&analysis, &figures, arguments.model.is_some());
+    remarks.extend(unseen);
     if arguments.json {
         let mut result = Map::new();
-        json::add_gains(&mut result, ControllerKind::of(&gains), Some(&gains));
+        match FormGains::Parallel(gains).to_ideal() {
+            Ok(ideal) => json::add_gains(&mut result, ControllerKind::of(&ideal), Some(&ideal)),
+            // Integral action alone has no ideal form.
+            Err(_) => optimal::add_gains(&mut result, ControllerKind::Pi, &gains),
+        }
         json::add_analysis(&mut result, &analysis);
         json::add_figures(&mut result, &analysis, &figures);
         json::add_remarks(&mut result, true, &remarks);

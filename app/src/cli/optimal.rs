@@ -1,7 +1,7 @@
 //! `vasos tune --optimal`: the best gains under limits, with their certificate.
 
 use serde_json::{Map, Value, json};
-use vasos_engine::analyze::{Analysis, OpenLoop};
+use vasos_engine::analyze::{Analysis, CoarseStep, FrequencyResponse, OpenLoop};
 use vasos_engine::control::ParallelGains;
 use vasos_engine::model::ProcessModel;
 use vasos_engine::tune::optimum::{
@@ -106,7 +106,7 @@ fn worst(processes: &[Process], gains: &ParallelGains) -> Analysis {
 }
 
 /// Kc, Ti, Td, N, Ki, Kd; what a pure integrator or a PI does not have is null.
-fn add_gains(to: &mut Map<String, Value>, kind: ControllerKind, gains: &ParallelGains) {
+pub(super) fn add_gains(to: &mut Map<String, Value>, kind: ControllerKind, gains: &ParallelGains) {
     let ParallelGains { kp, ki, kd, tf_s } = *gains;
     let integral_alone = kp == 0.0;
     let td_s = if kd == 0.0 { 0.0 } else { kd / kp };
@@ -156,6 +156,21 @@ fn warnings(gains: &ParallelGains) -> Vec<String> {
     found
 }
 
+/// What a response leaves unseen between its points.
+pub(super) fn coarse(response: &FrequencyResponse, gains: &ParallelGains) -> Option<String> {
+    let steps = response.coarse_steps(gains);
+    let worst = steps.iter().max_by(|a, b| a.phase_deg.abs().total_cmp(&b.phase_deg.abs()))?;
+    let between = |s: &CoarseStep| format!("{} and {}", shown(Some(s.from_rad_s)), shown(Some(s.to_rad_s)));
+    let all: Vec<String> = steps.iter().map(between).collect();
+    Some(format!(
+        "the points lie too far apart for these gains to be relied on: between {} rad/s the phase changes by {}° and the gain by a factor of {}, and a peak there is not seen; measure more frequencies between {} rad/s",
+        between(worst),
+        shown(Some(worst.phase_deg.round())),
+        shown(Some(worst.gain_ratio)),
+        all.join(", between ")
+    ))
+}
+
 fn answer(as_json: bool, processes: &[Process], question: &Question, found: &Optimum) -> Answer {
     let analysis = worst(processes, &found.gains);
     let first = processes.iter().find_map(|p| match p {
@@ -165,6 +180,11 @@ fn answer(as_json: bool, processes: &[Process], question: &Question, found: &Opt
     let side = |percent: f64| first.as_ref().and_then(|open| setpoint_side(open, percent));
     let weights = question.overshoot_percent.map(|percent| (percent, side(percent)));
     let mut remarks = warnings(&found.gains);
+    for process in processes {
+        if let Process::Measured(response) = process {
+            remarks.extend(coarse(response, &found.gains));
+        }
+    }
     if let Some((percent, None)) = weights {
         remarks.push(format!("no weight and no filter of the setpoint holds the overshoot at {percent} %"));
     }
@@ -265,6 +285,7 @@ fn refusal(as_json: bool, processes: &[Process], question: &Question, error: &Op
     to.insert("active".into(), json!([]));
     let mut floor = Map::new();
     if let OptimumError::Infeasible { limit, floor: value, .. }
+    | OptimumError::InfeasibleAtFilter { limit, floor: value, .. }
     | OptimumError::InfeasibleTogether { limit, floor: value, .. } = error
     {
         floor.insert(limit.to_string(), json!(value));

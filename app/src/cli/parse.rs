@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use vasos_engine::control::{GainsError, PidGains};
+use vasos_engine::control::{GainsError, ParallelGains, PidGains};
 use vasos_engine::explain::Explain;
 use vasos_engine::model::{Fopdt, Ipdt, ModelError, ProcessModel, Sopdt};
 use vasos_engine::tune::{RuleError, Ultimate};
@@ -12,6 +12,8 @@ pub const MODEL_FORMS: &str =
     "K=..,T=..,L=..  or  Kv=..,L=..  or  K=..,T1=..,T2=..,L=..[,Tz=..]  or  num=1 2,den=1 3 3 1,L=0";
 /// The way to write gains, for messages.
 pub const GAINS_FORM: &str = "Kc=..[,Ti=..][,Td=..][,N=..]";
+/// The ways to write gains where the parallel form is taken as well, for messages.
+pub const ANY_GAINS_FORM: &str = "Kc=..[,Ti=..][,Td=..][,N=..]  or  Kp=..,Ki=..[,Kd=..,Tf=..]";
 /// The way to write a limit of oscillation, for messages.
 pub const ULTIMATE_FORM: &str = "Ku=..,Pu=..";
 
@@ -51,6 +53,13 @@ pub enum ParseError {
         /// What was expected.
         form: &'static str,
     },
+    /// A number that no controller can have there.
+    OutOfRange {
+        /// Name.
+        name: &'static str,
+        /// Value as given.
+        value: f64,
+    },
     /// The numbers are no model.
     Model(ModelError),
     /// The numbers are no gains.
@@ -71,6 +80,12 @@ impl fmt::Display for ParseError {
             }
             Self::Twice { name } => write!(f, "{name} is given twice: leave one out"),
             Self::Missing { name, form } => write!(f, "{name} is missing: write {form}"),
+            Self::OutOfRange { name, value } => {
+                write!(
+                    f,
+                    "{name} = {value} is not usable: it must be finite, and Tf greater than 0 beside a Kd"
+                )
+            }
             Self::Model(error) => error.fmt(f),
             Self::Gains(error) => error.fmt(f),
             Self::Ultimate(error) => error.fmt(f),
@@ -88,6 +103,7 @@ impl Explain for ParseError {
             Self::NotANumber { .. } => "cli.not_a_number",
             Self::Twice { .. } => "cli.twice",
             Self::Missing { .. } => "cli.missing",
+            Self::OutOfRange { .. } => "cli.out_of_range",
             Self::Model(error) => error.key(),
             Self::Gains(error) => error.key(),
             Self::Ultimate(error) => error.key(),
@@ -102,6 +118,9 @@ impl Explain for ParseError {
             Self::Twice { name } => vec![("name", name.clone())],
             Self::Missing { name, form } => {
                 vec![("name", (*name).to_owned()), ("form", (*form).to_owned())]
+            }
+            Self::OutOfRange { name, value } => {
+                vec![("name", (*name).to_owned()), ("value", value.to_string())]
             }
             Self::Model(error) => error.args(),
             Self::Gains(error) => error.args(),
@@ -119,8 +138,8 @@ impl ParseError {
             Self::NoEquals { part: text("9"), form: MODEL_FORMS },
             Self::UnknownName { name: text("Q"), form: GAINS_FORM },
             Self::NotANumber { name: text("K"), text: text("four") },
-            Self::Twice { name: text("K") },
             Self::Missing { name: "T", form: MODEL_FORMS },
+            Self::OutOfRange { name: "Tf", value: -1.0 },
         ]
     }
 }
@@ -219,6 +238,30 @@ pub fn gains(text: &str) -> Result<PidGains, ParseError> {
     let n = parts.optional("N")?.unwrap_or(PidGains::DEFAULT_N);
     parts.end()?;
     PidGains { kc, ti_s, td_s, n }.validated().map_err(ParseError::Gains)
+}
+
+/// Gains of the ideal form as [`gains`] takes them, or of the parallel one, `Kp=..,Ki=..[,Kd=..,Tf=..]`, where Kp may be 0
+/// beside a Ki.
+///
+/// # Errors
+/// [`ParseError`] names the part.
+pub fn any_gains(text: &str) -> Result<ParallelGains, ParseError> {
+    let mut parts = Parts::of(text, ANY_GAINS_FORM)?;
+    if !["Kp", "Ki", "Kd", "Tf"].iter().any(|name| parts.has(name)) {
+        return gains(text).map(ParallelGains::from);
+    }
+    let kd = parts.optional("Kd")?.unwrap_or(0.0);
+    let [kp, ki] = [parts.optional("Kp")?, parts.optional("Ki")?].map(Option::unwrap_or_default);
+    let tf_s = if kd == 0.0 { parts.optional("Tf")?.unwrap_or(0.0) } else { parts.needed("Tf")? };
+    parts.end()?;
+    if kp == 0.0 && ki == 0.0 {
+        return Err(ParseError::Missing { name: "Kp or Ki", form: ANY_GAINS_FORM });
+    }
+    let named = [("Kp", kp, true), ("Ki", ki, true), ("Kd", kd, true), ("Tf", tf_s, kd == 0.0 || tf_s > 0.0)];
+    match named.iter().find(|(_, value, usable)| !(value.is_finite() && *usable)) {
+        Some((name, value, _)) => Err(ParseError::OutOfRange { name, value: *value }),
+        None => Ok(ParallelGains { kp, ki, kd, tf_s }),
+    }
 }
 
 /// Ultimate gain and period from a test.

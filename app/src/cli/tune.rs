@@ -18,7 +18,7 @@ Examples:
   vasos tune --model Kv=0.03,L=2 --rule all
   vasos tune --model K=4.9,T=152,L=2 --optimal --ms 1.4 --controller pi --json
   vasos tune --model K=4.9,T=152,L=2 --model K=4.2,T=110,L=2.6 --optimal --ms 1.6 --ju 20 --controller pid
-A rule without --controller gives the richest one it has; --rule all then gives every one.
+A rule without --controller gives the richest one it has for the model; --rule all then gives every one.
 Exit status 1: the rule has no answer for this model, or no controller meets the limits (the floor is said).")]
 pub struct Arguments {
     /// Process model, seconds: K=..,T=..,L=..  Kv=..,L=..  K=..,T1=..,T2=..,L=..[,Tz=..]  num=..,den=..,L=..; several
@@ -81,9 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     if arguments.optimal {
         return optimal::run(arguments, &models);
     }
-    if arguments.overshoot.is_some() || arguments.filter.is_some() {
-        return Err(Refusal("--overshoot and --filter belong to --optimal: rules have their own".to_owned()));
-    }
+    of_an_optimum(arguments)?;
     let [model] = models.as_slice() else {
         return Err(Refusal("rules take one model: leave one, or ask for --optimal".to_owned()));
     };
@@ -95,6 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
         let analysis = analyze(model, &tuning.gains);
         (tuning, analysis)
     };
+    let mut remarks = Vec::new();
     let applied: Vec<Applied> = if name == "all" {
         let wanted = |k: ControllerKind| kind.is_none_or(|wanted| wanted == k);
         let all = tune_all(model, &options).into_iter().filter(|(_, k, _)| wanted(*k));
@@ -102,11 +101,55 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer, Refusal> {
     } else {
         let rule = find_rule(name, kind.unwrap_or(ControllerKind::Pid)).ok_or_else(|| unknown_rule(name))?;
         let richest = || rule.controllers.iter().copied().max_by_key(|k| k.id().len());
-        let kind = kind.or_else(richest).unwrap_or(ControllerKind::Pi);
-        let outcome = rule.tune(model, kind, &options).map(worth);
-        vec![Applied { rule, kind, outcome }]
+        not_of_this_rule(arguments, rule)?;
+        let first = kind.or_else(richest).unwrap_or(ControllerKind::Pi);
+        let mut applied =
+            Applied { rule, kind: first, outcome: rule.tune(model, first, &options).map(worth) };
+        if kind.is_none() && matches!(applied.outcome, Err(RuleError::NeedsSecondOrder { .. })) {
+            remarks.push(format!("{name} gives a PID for second-order models only: this is its PI"));
+            let outcome = rule.tune(model, ControllerKind::Pi, &options).map(worth);
+            applied = Applied { rule, kind: ControllerKind::Pi, outcome };
+        }
+        vec![applied]
     };
-    answer(arguments.json, model, &applied)
+    let mut answer = answer(arguments.json, model, &applied)?;
+    answer.remarks.splice(0..0, remarks);
+    Ok(answer)
+}
+
+/// Refuses what only an optimum uses.
+fn of_an_optimum(arguments: &Arguments) -> Result<(), Refusal> {
+    let a = arguments;
+    let limits = [("--ms", a.ms), ("--mt", a.mt), ("--ju", a.ju)].map(|(name, v)| (name, v.is_some()));
+    let wishes = [
+        ("--objective", a.objective.is_some()),
+        ("--filter", a.filter.is_some()),
+        ("--overshoot", a.overshoot.is_some()),
+    ];
+    match limits.iter().chain(&wishes).find(|(_, given)| *given) {
+        Some((name, _)) => Err(Refusal(format!("{name} belongs to --optimal: rules have their own"))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses what other rules use and this one does not.
+fn not_of_this_rule(arguments: &Arguments, rule: &Rule) -> Result<(), Refusal> {
+    let refused = |name: &str, uses: fn(&Rule) -> bool| {
+        let mut ids: Vec<&str> = registry().iter().filter(|r| uses(r)).map(|r| r.id).collect();
+        ids.dedup();
+        Err(Refusal(format!(
+            "the rule {} does not use {name}: {} do, and all takes it",
+            rule.id,
+            ids.join(", ")
+        )))
+    };
+    if arguments.tau_c.is_some() && !rule.has_free_time_constant() {
+        return refused("--tau-c", Rule::has_free_time_constant);
+    }
+    if arguments.ultimate.is_some() && !rule.is_closed_loop() {
+        return refused("--ultimate", Rule::is_closed_loop);
+    }
+    Ok(())
 }
 
 pub(super) fn controller(name: &str) -> Result<ControllerKind, Refusal> {

@@ -41,10 +41,10 @@ const HEARD: f64 = 0.05;
 /// Points (ω, G(jω)) of a process in rising frequency, to be read at any frequency up to the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyResponse {
-    log_omega: Vec<f64>,
-    log_gain: Vec<f64>,
+    pub(super) log_omega: Vec<f64>,
+    pub(super) log_gain: Vec<f64>,
     /// Without jumps of 2π.
-    phase_rad: Vec<f64>,
+    pub(super) phase_rad: Vec<f64>,
     low: Asymptote,
 }
 

@@ -14,6 +14,7 @@ mod measured_error;
 mod metrics;
 mod open_loop;
 mod response;
+mod sampling;
 mod search;
 mod stability;
 mod sweep;
@@ -34,3 +35,4 @@ pub use response::{
     Response, ResponseEnd, ResponseOptions, StepFigures, loop_figures, loop_response, step_figures,
     step_response,
 };
+pub use sampling::CoarseStep;

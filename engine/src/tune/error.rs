@@ -3,6 +3,7 @@
 use super::ControllerKind;
 use crate::control::GainsError;
 use crate::explain::{Explain, number};
+use crate::model::{ProcessModel, ReducedOrder, ZeroPoleGain, half_rule};
 
 /// Why a rule gives no gains for a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,7 +30,7 @@ pub enum RuleError {
     },
     /// The rule gives this controller for second-order models only.
     #[error(
-        "the rule {rule} gives a {controller} controller for a second-order model only: identify T1 and T2"
+        "the rule {rule} gives a {controller} controller for a second-order model only: identify T1 and T2, or take its PI controller"
     )]
     NeedsSecondOrder {
         /// Id of the rule.
@@ -65,6 +66,14 @@ pub enum RuleError {
         /// Degree of the denominator.
         order: usize,
     },
+    /// Not of first or second order, or with a zero, but a reduced model is.
+    #[error(
+        "no rule here is made for a process of this order or with its zero: Skogestad's half rule makes {model} of it, tune for that model"
+    )]
+    Reducible {
+        /// The reduced model, as it is written on the command line.
+        model: String,
+    },
     /// Proportional control never reaches the stability limit.
     #[error(
         "the process has no ultimate gain: proportional control alone does not bring it to the stability limit"
@@ -98,6 +107,22 @@ pub enum RuleError {
 }
 
 impl RuleError {
+    /// The same, with the reduced model where the half rule makes one of a model that is not of the rules' structures.
+    pub(super) fn with_way_on(self, model: &ProcessModel) -> Self {
+        if !matches!(self, Self::Order { .. } | Self::LeadZero { .. }) {
+            return self;
+        }
+        let process = ZeroPoleGain::of(&model.transfer_function()).minimal();
+        let words = match half_rule(&process, ReducedOrder::First) {
+            Ok(ProcessModel::Fopdt(m)) => {
+                format!("K={},T={},L={}", plain(m.gain), plain(m.time_constant_s), plain(m.dead_time_s))
+            }
+            Ok(ProcessModel::Ipdt(m)) => format!("Kv={},L={}", plain(m.velocity_gain), plain(m.dead_time_s)),
+            _ => return self,
+        };
+        Self::Reducible { model: words }
+    }
+
     /// One value per variant, for the test that compares the sentences with the translations.
     #[must_use]
     pub fn samples() -> Vec<Self> {
@@ -111,6 +136,7 @@ impl RuleError {
             Self::UnstableProcess,
             Self::LeadZero { zero_time_constant_s: 3.5 },
             Self::Order { order: 4 },
+            Self::Reducible { model: "K=1,T=1.5,L=1.5".to_owned() },
             Self::NoUltimate,
             Self::Ultimate { ku: 0.0, pu_s: 8.0 },
             Self::TauC { value: -1.0 },
@@ -118,6 +144,11 @@ impl RuleError {
             Self::Gains(GainsError::N { value: 0.0 }),
         ]
     }
+}
+
+/// A number as the command line takes it, to six digits.
+fn plain(value: f64) -> String {
+    format!("{value:.5e}").parse::<f64>().unwrap_or(value).to_string()
 }
 
 impl Explain for RuleError {
@@ -132,6 +163,7 @@ impl Explain for RuleError {
             Self::UnstableProcess => "rule.unstable_process",
             Self::LeadZero { .. } => "rule.lead_zero",
             Self::Order { .. } => "rule.order",
+            Self::Reducible { .. } => "rule.reducible",
             Self::NoUltimate => "rule.no_ultimate",
             Self::Ultimate { .. } => "rule.ultimate",
             Self::TauC { .. } => "rule.tau_c",
@@ -152,6 +184,7 @@ impl Explain for RuleError {
             }
             Self::ComplexPoles | Self::UnstableProcess | Self::NoUltimate => Vec::new(),
             Self::LeadZero { zero_time_constant_s } => vec![("zero", number(*zero_time_constant_s))],
+            Self::Reducible { model } => vec![("model", model.clone())],
             Self::Order { order } => vec![("order", order.to_string())],
             Self::Ultimate { ku, pu_s } => vec![("ku", number(*ku)), ("pu", number(*pu_s))],
             Self::TauC { value } => vec![("value", number(*value))],

@@ -194,7 +194,10 @@ impl Rule {
             }
             Formula::Model { first_order, integrating, second_order } => {
                 let mut warnings = Vec::new();
-                let mut shape = Shape::of(model, &mut warnings)?;
+                let mut shape = Shape::of(model, &mut warnings).map_err(|error| error.with_way_on(model))?;
+                if matches!(shape, Shape::Integrating(_)) && integrating.is_none() {
+                    return Err(RuleError::NotForIntegrating { rule: self.id });
+                }
                 if let Shape::SecondOrder(m) = shape
                     && second_order.is_none_or(|f| f(&m, kind, 1.0).is_none())
                 {

@@ -32,10 +32,15 @@ impl Ultimate {
 /// Proportional gain, relative to what the process could feel, from which its limit is sought.
 const SMALL_GAIN: f64 = 1e-6;
 
+/// Gains per decade, and decades about 1/|G| at the process's lowest frequency, among which one that stabilises is sought.
+const PER_DECADE: f64 = 24.0;
+const DECADES: f64 = 3.0;
+
 /// Ku and Pu of a model, dead time exact: `arg G(jω) = −π` at ω = 2π/Pu, `Ku = 1/|G(jω)|`, by root finding.
 ///
 /// Where several frequencies qualify, the one reached first from small gains. `None` where no proportional gain
-/// brings the process to its limit (first and second order without dead time), or small ones do not stabilise it.
+/// brings the process to its limit (first and second order without dead time). An unstable process has the limit at the
+/// upper end of the gains that stabilise it.
 #[must_use]
 pub fn ultimate(model: &ProcessModel) -> Option<Ultimate> {
     let process = OpenLoop::new(model, &PidGains::p(1.0));
@@ -43,6 +48,18 @@ pub fn ultimate(model: &ProcessModel) -> Option<Ultimate> {
     // |L| falls under 1 long before any of the process's own frequencies.
     let gain = low.coefficient * process.lowest_frequency().powi(low.power);
     let kc = SMALL_GAIN / gain;
+    at_limit(model, kc).or_else(|| {
+        // What is unstable by itself needs a gain of its own: the weakest that stabilises leads to the upper end.
+        let unit = 1.0 / process.process_at_omega(process.lowest_frequency()).norm();
+        let steps = (DECADES * PER_DECADE) as i32;
+        let gains = (-steps..=steps).map(|k| unit * 10f64.powf(f64::from(k) / PER_DECADE));
+        let both = gains.flat_map(|kc| [kc * gain.signum(), -kc * gain.signum()]);
+        both.filter_map(|kc| at_limit(model, kc)).next()
+    })
+}
+
+/// The limit that is reached from a stabilising gain upwards; `None` where the gain does not stabilise or there is none.
+fn at_limit(model: &ProcessModel, kc: f64) -> Option<Ultimate> {
     let analysis = analyze_loop(&OpenLoop::new(model, &PidGains::p(kc)));
     let omega = analysis.w_180_rad_s.filter(|w| *w > 0.0)?;
     let pu_s = 2.0 * std::f64::consts::PI / omega;
@@ -74,5 +91,17 @@ mod tests {
     #[test]
     fn a_lag_without_dead_time_has_no_limit() {
         assert_eq!(ultimate(&ProcessModel::Fopdt(Fopdt::new(2.0, 5.0, 0.0).expect("a model"))), None);
+    }
+
+    /// Said to have no ultimate gain, because small gains do not stabilise e^(−0.2 s)/(s − 1): those from 1 to Ku do, where
+    /// ω = tan 0.2 ω, so ω = 7.1 to 7.3 rad/s and Ku = √(1 + ω²).
+    #[test]
+    fn an_unstable_process_has_its_limit_at_the_upper_end_of_what_stabilises() {
+        let model = ProcessModel::rational(&[1.0], &[1.0, -1.0], 0.2).expect("a model");
+        let found = ultimate(&model).expect("a limit");
+        let omega = 2.0 * std::f64::consts::PI / found.pu_s;
+        assert!(((0.2 * omega).tan() / omega - 1.0).abs() < 1e-9, "{found:?}");
+        assert!((found.ku / (1.0 + omega * omega).sqrt() - 1.0).abs() < 1e-9, "{found:?}");
+        assert!(found.ku > 7.1 && found.ku < 7.3, "{found:?}");
     }
 }

@@ -31,7 +31,8 @@ Identifies the process, tunes for it and compares: the best tuning under the lim
 present tuning as --present gives it or the log shows it, each on 200 models that fit the log as well.
 A folder gives a table of all its logs (text, workbooks, Parquet, recordings), those that gain most first; with -o a report for each
 in that folder, or the table alone where -o ends in .html.
-Exit status 1: don't retune, or the log cannot tell a tuning; the answer says why.")]
+Exit status 1: don't retune, or the log cannot tell a tuning; the answer says why. Of a folder: no log
+of it tells anything.")]
 pub struct Arguments {
     /// Log file, or a folder of them.
     log: PathBuf,

@@ -16,9 +16,9 @@ const ROWS: usize = 5;
 /// An oscillation of the loop and what its shape says of the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Oscillation {
-    /// Period in seconds.
+    /// Median period in seconds.
     pub period_s: f64,
-    /// Mean of the periods over three times their scatter; above 1 the oscillation is regular.
+    /// Median of the periods over three times their scatter; above 1 the oscillation is regular.
     pub regularity: f64,
     /// Error of sines over that of sines and triangles together: 0 a sine, 1 a triangle; from 0.6 on stiction.
     pub stiction_index: f64,
@@ -43,8 +43,7 @@ pub(super) fn oscillation(time_s: &[f64], pv: &[f64], mv: &[f64], integrating: b
     }
     // Whole periods: the two halves of one need not be equal.
     let periods: Vec<f64> = crossings.windows(3).map(|w| time_s[w[2]] - time_s[w[0]]).collect();
-    let mean = periods.iter().sum::<f64>() / periods.len() as f64;
-    let scatter = (periods.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / periods.len() as f64).sqrt();
+    let (median, scatter) = median_and_scatter(periods);
     let (mut sine, mut triangle) = (0.0, 0.0);
     let mut counted = 0;
     for w in crossings.windows(2).filter(|w| w[1] - w[0] >= ROWS) {
@@ -56,12 +55,20 @@ pub(super) fn oscillation(time_s: &[f64], pv: &[f64], mv: &[f64], integrating: b
             counted += 1;
         }
     }
-    (counted >= HALF_PERIODS && mean > 0.0).then(|| Oscillation {
-        period_s: mean,
-        regularity: if scatter > 0.0 { mean / (3.0 * scatter) } else { f64::INFINITY },
+    (counted >= HALF_PERIODS && median > 0.0).then(|| Oscillation {
+        period_s: median,
+        regularity: if scatter > 0.0 { median / (3.0 * scatter) } else { f64::INFINITY },
         stiction_index: if sine + triangle > 0.0 { sine / (sine + triangle) } else { 0.5 },
         stiction_band: band(pv, mv),
     })
+}
+
+/// Median, and half the range that the middle 68 % take: of a normal distribution its standard deviation. A start-up or a
+/// few odd periods, each of which lies in two whole ones, move neither.
+fn median_and_scatter(mut values: Vec<f64>) -> (f64, f64) {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
+    (at(0.5), 0.5 * (at(0.84) - at(0.16)))
 }
 
 /// Without mean and straight line.
@@ -202,5 +209,23 @@ mod tests {
         let lag: Vec<f64> = t.iter().map(|t| 50.0 + 2.0 * (t / 7.0 - 1.2).sin()).collect();
         let found = oscillation(&t, &lag, &sine, false).expect("an oscillation");
         assert!(!found.sticks() && found.stiction_index < 0.4, "{found:?}");
+    }
+
+    /// One long period at the start made mean/(3 sd) of 60 half-overlapping periods 0.5, and a sticking valve none.
+    #[test]
+    fn one_odd_period_hides_no_sticking_valve() {
+        const LONG: usize = 150;
+        const PERIOD: usize = 28;
+        let place = |k: usize| if k < LONG { 0.25 } else { ((k - LONG) % PERIOD) as f64 / PERIOD as f64 };
+        let t: Vec<f64> = (0..LONG + 30 * PERIOD).map(|k| k as f64).collect();
+        let mv: Vec<f64> = (0..t.len())
+            .map(|k| {
+                let x = place(k);
+                50.0 + 3.0 * if x < 0.5 { 1.0 - (4.0 * x - 1.0).abs() } else { (4.0 * x - 3.0).abs() - 1.0 }
+            })
+            .collect();
+        let pv: Vec<f64> = (0..t.len()).map(|k| if place(k) < 0.5 { 51.0 } else { 49.0 }).collect();
+        let found = oscillation(&t, &pv, &mv, false).expect("an oscillation");
+        assert!(found.sticks() && found.period_s == 28.0, "{found:?}");
     }
 }

@@ -59,6 +59,24 @@ pub enum OptimumError {
         /// Least value that can be reached.
         floor: f64,
     },
+    /// No PID controller of this filter keeps one limit about a double integrator.
+    #[error(
+        "no PID controller with N = {} in its derivative filter keeps {} under {} on a process that integrates twice: the slower the loop, the nearer it comes to {}, and none goes below; raise N, which lowers that, or the limit",
+        number(*.n),
+        .limit,
+        asked_and_floor(*.asked, *.floor)[0],
+        asked_and_floor(*.asked, *.floor)[1]
+    )]
+    InfeasibleAtFilter {
+        /// N of the filter.
+        n: f64,
+        /// Limit to relax.
+        limit: Limit,
+        /// What was asked.
+        asked: f64,
+        /// What slow loops come down to with this N.
+        floor: f64,
+    },
     /// Relaxing one limit alone does not help.
     #[error(
         "no {controller} controller that stabilises this process keeps these limits together: without the others {} goes down to {}; relax two of them",
@@ -125,6 +143,7 @@ impl OptimumError {
         matches!(
             self,
             Self::Infeasible { .. }
+                | Self::InfeasibleAtFilter { .. }
                 | Self::InfeasibleTogether { .. }
                 | Self::NotStabilisable { .. }
                 | Self::Unbounded
@@ -144,6 +163,7 @@ impl OptimumError {
             Self::NoLimit,
             Self::NoProcess,
             Self::Infeasible { controller: "PI", limit: Limit::Ju, asked: 1.0, floor: 1.5 },
+            Self::InfeasibleAtFilter { n: 10.0, limit: Limit::Ms, asked: 1.2, floor: 1.2234 },
             Self::InfeasibleTogether { controller: "PID", limit: Limit::Ms, floor: 1.3 },
             Self::NotStabilisable { controller: "PI" },
             Self::Unbounded,
@@ -163,6 +183,7 @@ impl Explain for OptimumError {
             Self::NoLimit => "optimum.no_limit",
             Self::NoProcess => "optimum.no_process",
             Self::Infeasible { .. } => "optimum.infeasible",
+            Self::InfeasibleAtFilter { .. } => "optimum.infeasible_at_filter",
             Self::InfeasibleTogether { .. } => "optimum.infeasible_together",
             Self::NotStabilisable { .. } => "optimum.not_stabilisable",
             Self::OutOfRange { .. } => "optimum.out_of_range",
@@ -186,6 +207,10 @@ impl Explain for OptimumError {
                     ("asked", asked),
                     ("floor", floor),
                 ]
+            }
+            Self::InfeasibleAtFilter { n, limit, asked, floor } => {
+                let [asked, floor] = asked_and_floor(*asked, *floor);
+                vec![("n", number(*n)), ("limit", limit.to_string()), ("asked", asked), ("floor", floor)]
             }
             Self::InfeasibleTogether { controller, limit, floor } => vec![
                 ("controller", (*controller).to_owned()),

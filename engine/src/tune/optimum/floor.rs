@@ -4,17 +4,24 @@ use super::certificate::Limit;
 use super::error::OptimumError;
 use super::problem::LoopLimits;
 use super::relax::Relax;
+use super::slice::{Lead, Shaped};
+use super::slow;
 use super::solve::Solver;
 
-/// The limit on Ju that integral action rules out: C S is 1/G for ω → 0.
-pub(super) fn of_ju(solver: &Solver<'_>) -> Option<OptimumError> {
+/// The limit on Ju that integral action rules out: C S is 1/G for ω → 0. Slow loops of a stable process come as near to
+/// that as one likes; what has to be stabilised first may take more.
+pub(super) fn of_ju(solver: &mut Solver<'_>) -> Option<OptimumError> {
     let (asked, floor) = (solver.limits.ju, solver.family.least_ju());
+    if asked >= floor * (1.0 - 1e-12) {
+        return None;
+    }
+    let shaped = Shaped::new(&solver.family.points, Lead::NONE);
+    let by_itself = solver.family.stabilising(&shaped).first().is_some_and(|gains| gains.0 == 0.0);
     let controller = solver.controller();
-    (asked < floor * (1.0 - 1e-12)).then_some(OptimumError::Infeasible {
-        controller,
-        limit: Limit::Ju,
-        asked,
-        floor,
+    Some(if by_itself {
+        OptimumError::Infeasible { controller, limit: Limit::Ju, asked, floor }
+    } else {
+        explain(solver)
     })
 }
 
@@ -22,6 +29,9 @@ pub(super) fn of_ju(solver: &Solver<'_>) -> Option<OptimumError> {
 pub(super) fn explain(solver: &mut Solver<'_>) -> OptimumError {
     let controller = solver.controller();
     let asked = solver.limits;
+    if let Some(refused) = of_slow(solver) {
+        return refused;
+    }
     let mut best: Option<(f64, Limit, f64, f64)> = None;
     for (limit, own) in [(Limit::Ms, asked.ms), (Limit::Mt, asked.mt), (Limit::Ju, asked.ju)] {
         if !own.is_finite() {
@@ -64,5 +74,20 @@ fn beyond(solver: &mut Solver<'_>, asked: &LoopLimits) -> OptimumError {
 
 /// The least value of one limit, the others as given; `None` where relaxing it does not help.
 fn least(solver: &mut Solver<'_>, limit: Limit, given: &LoopLimits) -> Option<f64> {
-    solver.least(Relax::one(limit, *given)?).map(|(value, _)| value)
+    let (value, _) = solver.least(Relax::one(limit, *given)?)?;
+    Some(if limit == Limit::Ju { value.max(solver.family.least_ju()) } else { value })
+}
+
+/// A limit on Ms or Mt that rules out loops of every speed about a double integrator: the filter's N decides.
+pub(super) fn of_slow(solver: &Solver<'_>) -> Option<OptimumError> {
+    let asked = solver.limits;
+    let n = slow::filter(solver.wanted)?;
+    let alone = LoopLimits { ms: f64::INFINITY, mt: f64::INFINITY, ..asked };
+    let of = |limit: Limit, own: f64, given: LoopLimits| {
+        let floor = slow::floor(solver, limit, &given)?;
+        Some(OptimumError::InfeasibleAtFilter { n, limit, asked: own, floor })
+    };
+    of(Limit::Ms, asked.ms, LoopLimits { ms: asked.ms, ..alone })
+        .or_else(|| of(Limit::Mt, asked.mt, LoopLimits { mt: asked.mt, ..alone }))
+        .or_else(|| of(Limit::Ms, asked.ms, asked))
 }

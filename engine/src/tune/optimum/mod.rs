@@ -26,6 +26,7 @@ mod problem;
 mod relax;
 mod simplex;
 mod slice;
+mod slow;
 mod solve;
 mod stabilising;
 mod valley;

@@ -11,6 +11,7 @@ use super::points::{Plant, Points};
 use super::problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
 use super::relax::Relax;
 use super::slice::Lead;
+use super::slow;
 
 /// Rounds of search and check, and of the last steps at fixed Kp, at most.
 const ROUNDS: usize = 14;
@@ -75,7 +76,7 @@ fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, Optimum
     if let Some(plant) = lost {
         return Err(OptimumError::OutOfRange { gain: solver.family.plants[plant].low.coefficient });
     }
-    if let Some(refused) = floor::of_ju(&solver) {
+    if let Some(refused) = floor::of_ju(&mut solver) {
         return Err(refused);
     }
     let found = match problem.objective {
@@ -84,7 +85,9 @@ fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, Optimum
     };
     match found {
         // With derivative action two lags without dead time take any gain: the search runs after it until it gives up.
-        Err(OptimumError::NotCertified { .. }) if solver.takes_any_gain() => Err(OptimumError::Unbounded),
+        Err(OptimumError::NotCertified { .. }) if solver.takes_any_gain() => {
+            Err(floor::of_slow(&solver).unwrap_or(OptimumError::Unbounded))
+        }
         found => found,
     }
 }
@@ -366,13 +369,19 @@ impl<'a> Solver<'a> {
                 let least = self.least(Relax::together(self.limits)).filter(|(stretch, _)| *stretch <= 1.0);
                 found = least.map_or(Found::Nothing, |(_, candidate)| Found::Best(candidate));
             }
+            if matches!(found, Found::Nothing | Found::NotStabilising)
+                && let Some(slow) = slow::gains(self, objective)
+            {
+                found = Found::Best(slow);
+            }
             let candidate = match found {
                 Found::Best(candidate) => candidate,
                 Found::Unbounded => return Err(OptimumError::Unbounded),
-                Found::NotStabilising => {
+                // Of a PI: derivative action may stabilise, though not within the limits.
+                Found::NotStabilising if self.wanted == Wanted::Pi => {
                     return Err(OptimumError::NotStabilisable { controller: self.controller() });
                 }
-                Found::Nothing => return Ok(None),
+                Found::Nothing | Found::NotStabilising => return Ok(None),
             };
             let check = self.check(objective, &candidate)?;
             if !check.unstable.is_empty() {
