@@ -23,8 +23,6 @@ fn solve(
     optimum(&OptimumProblem { processes: &processes, wanted, objective, limits })
 }
 
-/// Everything that makes an optimum one, but that nothing is better.
-
 /// Gains that keep the limits.
 fn check_limits(model: &ProcessModel, limits: &LoopLimits, found: &Optimum) {
     let analysis = analyze_loop(&OpenLoop::of_parallel(model, &found.gains));

@@ -260,7 +260,7 @@ fn as_table(
         (true, _) => "No limit binds.".to_owned(),
         (false, Some(gap)) => {
             format!(
-                "Held by {}; nothing is better by more than {} %.",
+                "Held by {}; the search and the exact check agree to {} %.",
                 active.join(", "),
                 shown(Some(100.0 * gap))
             )

@@ -460,6 +460,7 @@ impl Explain for Repair {
         }
     }
 
+    #[allow(clippy::too_many_lines, reason = "the arguments of each kind, and nothing else")]
     fn args(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::MissingValues { column, count, line, text } => vec![
