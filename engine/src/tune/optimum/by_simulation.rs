@@ -17,6 +17,8 @@ use crate::analyze::{Excitation, OpenLoop, ResponseEnd, ResponseOptions, loop_re
 const WORTH_OF_DERIVATIVE: f64 = 0.002;
 const WORTH_OF_DISGUISE: f64 = 0.01;
 const SLOW_FILTER_RAD: f64 = 100.0;
+/// How far from the least Jv another valley of Td has to lie to be a start of its own, as a logarithm.
+const ELSEWHERE: f64 = 0.4;
 /// Rounds of exact checks of the result.
 const ROUNDS: usize = 20;
 /// Shares of the largest Ki at which searches start.
@@ -52,6 +54,8 @@ const AGAIN: Simplex = Simplex { step: 0.05, last_step: 2e-5, most_evaluations: 
 pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Optimum, OptimumError> {
     let wanted = solver.wanted;
     let start = solver.solve(Objective::Jv)?;
+    // What Jv is not best in IAE may be.
+    let valleys = if wanted == Wanted::Pi { Vec::new() } else { solver.valleys.clone() };
     let mut best = valued(solver, objective, start.clone());
     let mut without: Option<Optimum> = None;
     let mut take = |found: Option<Optimum>| {
@@ -69,6 +73,11 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
         take(found);
     }
     take(searched(solver, objective, &start));
+    let from = lead_of(&start).td_s;
+    let elsewhere = |v: &&Candidate| from == 0.0 || (v.lead.td_s / from).ln().abs() > ELSEWHERE;
+    for valley in valleys.iter().filter(elsewhere) {
+        take(searched_from(solver, objective, valley));
+    }
     Ok(match without {
         Some(without) if simpler_does(solver, &best, &without) => without,
         _ => best,

@@ -158,7 +158,7 @@ pub(super) struct Solver<'a> {
     pub wanted: Wanted,
     pub limits: LoopLimits,
     /// Bottoms of the valleys of Td that the last look at everything came to, on its points.
-    valleys: Vec<Candidate>,
+    pub valleys: Vec<Candidate>,
 }
 
 impl<'a> Solver<'a> {
@@ -324,10 +324,12 @@ impl<'a> Solver<'a> {
     /// The same from the deepest valley that the first look sees, and from others where it comes to less than they
     /// promise: on all points a valley may be worth less than on the first ones, or too narrow to stay in.
     fn sought(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
-        self.valleys.clear();
+        if self.wanted != Wanted::Pi {
+            self.valleys.clear();
+        }
         let Some(mut best) = self.pursued(objective, None)? else { return Ok(None) };
         let value = |o: &Optimum| if objective == Objective::Jv { o.value } else { -o.value };
-        let mut valleys = std::mem::take(&mut self.valleys);
+        let mut valleys = if self.wanted == Wanted::Pi { Vec::new() } else { self.valleys.clone() };
         valleys.sort_by(|a, b| a.value.total_cmp(&b.value));
         for valley in valleys {
             let promises = |best: &Optimum| valley.value < value(best) - LOST * value(best).abs();
