@@ -27,9 +27,12 @@ pub(super) fn parted(lines: &[&str], start: usize, dialect: Dialect) -> Result<O
     }
     let rows = || lines[start..].iter().filter(|line| !is_blank(line) && !is_remark(line));
     let (mut least, mut most, mut all_whole) = (usize::MAX, 0, true);
+    let (mut longer, mut count) = (0, 0);
     for line in rows() {
         dialect.split(line, &mut fields);
         (least, most) = (least.min(fields.len()), most.max(fields.len()));
+        count += 1;
+        longer += usize::from(fields.len() > names);
         all_whole &= fields.iter().skip(1).all(|field| is_whole(field));
     }
     if !(names..=2 * names).contains(&least) || most > 2 * names || most == names {
@@ -47,7 +50,7 @@ pub(super) fn parted(lines: &[&str], start: usize, dialect: Dialect) -> Result<O
         }
         return Ok(pairs.then_some(ahead));
     }
-    if all_whole && least < most {
+    if all_whole && least < most && 2 * longer > count {
         return Err(ImportError::CommasInCommas { line: start + 1, names, fields: most });
     }
     Ok(None)

@@ -88,6 +88,13 @@ fn with_sign(problem: &OptimumProblem<'_>, sign: f64) -> Result<Optimum, Optimum
         Err(OptimumError::NotCertified { .. }) if solver.takes_any_gain() => {
             Err(floor::of_slow(&solver).unwrap_or(OptimumError::Unbounded))
         }
+        Ok(found)
+            if found.certificate.active.is_empty()
+                && solver.takes_any_gain()
+                && solver.takes_more(&found) =>
+        {
+            Err(OptimumError::Unbounded)
+        }
         found => found,
     }
 }
@@ -177,6 +184,16 @@ impl<'a> Solver<'a> {
         let free = |p: &Plant<'_>| p.dead_time_s == 0.0 && p.excess <= 2;
         let derivative = self.wanted != Wanted::Pi;
         derivative && self.limits.ju.is_infinite() && self.family.plants.iter().all(free)
+    }
+
+    /// Whether ten times these gains stabilise as well.
+    fn takes_more(&self, found: &Optimum) -> bool {
+        const MORE: f64 = 10.0;
+        let gains = found.gains;
+        let td_s = if gains.kd == 0.0 { 0.0 } else { gains.kd / gains.kp };
+        let lead = if td_s == 0.0 { Lead::NONE } else { Lead { td_s, tf_s: gains.tf_s } };
+        let sign = MORE * self.family.sign;
+        self.family.is_stable(lead, sign * gains.kp, sign * gains.ki)
     }
 
     pub fn controller(&self) -> &'static str {
