@@ -127,6 +127,10 @@ pub(super) fn settle(rows: &[&str], layout: &mut Layout, told: Option<Decimal>) 
     });
     let separator = layout.dialect.separator;
     layout.marks = seen.iter().map(|column| marks_of(column, layout.decimal, certain, separator)).collect();
+    // A file of nothing but numbers with three decimals has that many by its format.
+    if !seen.iter().any(|column| column.short || column.long) {
+        layout.marks.iter_mut().flatten().filter(|m| !m.grouped).for_each(|marks| marks.doubtful = false);
+    }
 }
 
 fn marks_of(seen: &Seen, decimal: Decimal, certain: [bool; 2], separator: Separator) -> Option<Marks> {
