@@ -1,36 +1,11 @@
 //! Limits that no controller meets: the floor that is named instead.
 
-use vasos_engine::analyze::{OpenLoop, analyze_loop};
+#[path = "optimum/problems.rs"]
+mod problems;
+
+use problems::{FREE, check_limits, rational, solve};
 use vasos_engine::model::ProcessModel;
-use vasos_engine::tune::optimum::{
-    DerivativeFilter, Limit, LoopLimits, Objective, Optimum, OptimumError, OptimumProblem, Process, Wanted,
-    optimum,
-};
-
-const FREE: f64 = f64::INFINITY;
-
-fn rational(num: &[f64], den: &[f64], dead_time_s: f64) -> ProcessModel {
-    ProcessModel::rational(num, den, dead_time_s).expect("a model")
-}
-
-fn solve(
-    model: &ProcessModel,
-    wanted: Wanted,
-    objective: Objective,
-    limits: LoopLimits,
-) -> Result<Optimum, OptimumError> {
-    let processes = [Process::Model(model.clone())];
-    optimum(&OptimumProblem { processes: &processes, wanted, objective, limits })
-}
-
-/// Gains that keep the limits.
-fn check_limits(model: &ProcessModel, limits: &LoopLimits, found: &Optimum) {
-    let analysis = analyze_loop(&OpenLoop::of_parallel(model, &found.gains));
-    assert!(analysis.stable, "{found:?}");
-    for (value, limit) in [(analysis.ms, limits.ms), (analysis.mt, limits.mt), (analysis.ju, limits.ju)] {
-        assert!(value.expect("finite") <= limit * (1.0 + 1e-8), "{limits:?} {found:?}");
-    }
-}
+use vasos_engine::tune::optimum::{DerivativeFilter, Limit, LoopLimits, Objective, OptimumError, Wanted};
 
 /// A PID was said not to stabilise k/s² at all where a limit is too strict for its filter. A filter of N lifts the phase by
 /// asin(N/(N + 2)) at most, so neither Ms nor Mt falls below 1 + 2/N: 1.2 for N = 10, 1.02 for N = 100.

@@ -2,9 +2,12 @@
 
 #[path = "optimum/plain_search.rs"]
 mod plain_search;
+#[path = "optimum/problems.rs"]
+mod problems;
 
 use num_complex::Complex64;
 use plain_search::plain_search;
+use problems::{FREE, check_limits, rational, solve};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use vasos_engine::analyze::{FrequencyResponse, OpenLoop, analyze_loop, is_loop_stable, loop_figures};
@@ -15,36 +18,11 @@ use vasos_engine::tune::optimum::{
     optimum,
 };
 
-const FREE: f64 = f64::INFINITY;
-
-fn rational(num: &[f64], den: &[f64], dead_time_s: f64) -> ProcessModel {
-    ProcessModel::rational(num, den, dead_time_s).expect("a model")
-}
-
-fn solve(
-    model: &ProcessModel,
-    wanted: Wanted,
-    objective: Objective,
-    limits: LoopLimits,
-) -> Result<Optimum, OptimumError> {
-    let processes = [Process::Model(model.clone())];
-    optimum(&OptimumProblem { processes: &processes, wanted, objective, limits })
-}
-
 /// Everything that makes an optimum one, but that nothing is better.
 fn check(model: &ProcessModel, limits: &LoopLimits, found: &Optimum) {
     check_limits(model, limits, found);
     assert!(!found.certificate.active.is_empty(), "{found:?}");
     assert!(found.certificate.gap.is_none_or(|gap| gap < 1e-4), "{found:?}");
-}
-
-/// Gains that keep the limits.
-fn check_limits(model: &ProcessModel, limits: &LoopLimits, found: &Optimum) {
-    let analysis = analyze_loop(&OpenLoop::of_parallel(model, &found.gains));
-    assert!(analysis.stable, "{found:?}");
-    for (value, limit) in [(analysis.ms, limits.ms), (analysis.mt, limits.mt), (analysis.ju, limits.ju)] {
-        assert!(value.expect("finite") <= limit * (1.0 + 1e-8), "{limits:?} {found:?}");
-    }
 }
 
 /// golden/optimal_pi.json: numpy and scipy, dense grids; Jv good to 2e-5, the last case to 1e-3.

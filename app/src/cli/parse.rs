@@ -138,6 +138,7 @@ impl ParseError {
             Self::NoEquals { part: text("9"), form: MODEL_FORMS },
             Self::UnknownName { name: text("Q"), form: GAINS_FORM },
             Self::NotANumber { name: text("K"), text: text("four") },
+            Self::Twice { name: text("K") },
             Self::Missing { name: "T", form: MODEL_FORMS },
             Self::OutOfRange { name: "Tf", value: -1.0 },
         ]

@@ -6,6 +6,8 @@ use super::marks::Shape;
 use super::split::Dialect;
 use super::{Decimal, ImportError};
 
+/// Rows by which it is told.
+const ROWS: usize = 400;
 /// Fields ahead of the numbers: a date and a time of day, or a count.
 const AHEAD: usize = 2;
 
@@ -25,7 +27,7 @@ pub(super) fn parted(lines: &[&str], start: usize, dialect: Dialect) -> Result<O
     if names < 2 || !fields.iter().all(is_name) {
         return Ok(None);
     }
-    let rows = || lines[start..].iter().filter(|line| !is_blank(line) && !is_remark(line));
+    let rows = || lines[start..].iter().filter(|line| !is_blank(line) && !is_remark(line)).take(ROWS);
     let (mut least, mut most, mut all_whole) = (usize::MAX, 0, true);
     let (mut longer, mut count) = (0, 0);
     for line in rows() {

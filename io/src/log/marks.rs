@@ -34,11 +34,11 @@ impl Shape {
             return Self::Other;
         }
         let mark = |c: u8| if c == b'.' { Decimal::Point } else { Decimal::Comma };
-        let marks: Vec<u8> = digits.bytes().filter(|b| !b.is_ascii_digit()).collect();
-        match marks[..] {
-            [] if digits.is_empty() => Self::Other,
-            [] => Self::Whole { long: digits.len() > 3 },
-            [one] => {
+        let mut marks = digits.bytes().filter(|b| !b.is_ascii_digit());
+        match (marks.next(), marks.next_back()) {
+            (None, _) if digits.is_empty() => Self::Other,
+            (None, _) => Self::Whole { long: digits.len() > 3 },
+            (Some(one), None) => {
                 let (whole, behind) = digits.split_once(char::from(one)).unwrap_or((digits, ""));
                 if whole.is_empty() && behind.is_empty() {
                     Self::Other
@@ -48,10 +48,10 @@ impl Shape {
                     Self::Decimals(mark(one))
                 }
             }
-            [first, .., last] if first != last => Self::Decimals(mark(last)),
-            [first, ..] => {
-                let groups: Vec<&str> = digits.split(char::from(first)).collect();
-                let whole = is_first_group(groups[0]) && groups[1..].iter().all(|g| g.len() == 3);
+            (Some(first), Some(last)) if first != last => Self::Decimals(mark(last)),
+            (Some(first), Some(_)) => {
+                let mut groups = digits.split(char::from(first));
+                let whole = groups.next().is_some_and(is_first_group) && groups.all(|g| g.len() == 3);
                 if whole { Self::Decimals(mark(first).other()) } else { Self::Other }
             }
         }

@@ -55,7 +55,7 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
     let wanted = solver.wanted;
     let start = solver.solve(Objective::Jv)?;
     // What Jv is not best in IAE may be.
-    let valleys = if wanted == Wanted::Pi { Vec::new() } else { solver.valleys.clone() };
+    let valleys = std::mem::take(&mut solver.valleys);
     let mut best = valued(solver, objective, start.clone());
     let mut without: Option<Optimum> = None;
     let mut take = |found: Option<Optimum>| {
@@ -73,7 +73,7 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
         take(found);
     }
     take(searched(solver, objective, &start));
-    let from = lead_of(&start).td_s;
+    let from = Lead::of(&start.gains).td_s;
     let elsewhere = |v: &&Candidate| from == 0.0 || (v.lead.td_s / from).ln().abs() > ELSEWHERE;
     for valley in valleys.iter().filter(elsewhere) {
         take(searched_from(solver, objective, valley));
@@ -88,29 +88,24 @@ pub(super) fn solve(solver: &mut Solver<'_>, objective: Objective) -> Result<Opt
 /// one whose filter is so slow that its derivative is proportional action at every frequency that matters, with a Td and a
 /// Kp that mean nothing.
 fn simpler_does(solver: &Solver<'_>, with: &Optimum, without: &Optimum) -> bool {
-    let lead = lead_of(with);
-    let sign = solver.family.sign;
-    let candidate = Candidate { lead, kp: sign * with.gains.kp, ki: sign * with.gains.ki, value: 0.0 };
+    let candidate = candidate_of(solver, with);
+    let lead = candidate.lead;
     let disguised = lead.tf_s * solver.nearest_omega(&candidate) > SLOW_FILTER_RAD;
     let worth = if disguised { WORTH_OF_DISGUISE } else { WORTH_OF_DERIVATIVE };
     lead.td_s > 0.0 && without.value <= with.value * (1.0 + worth)
 }
 
-/// An optimum for another objective with its IAE.
-fn valued(solver: &Solver<'_>, objective: Objective, found: Optimum) -> Optimum {
+/// The gains of an optimum, as a search goes by them.
+fn candidate_of(solver: &Solver<'_>, found: &Optimum) -> Candidate {
     let sign = solver.family.sign;
-    let lead = lead_of(&found);
-    let candidate = Candidate { lead, kp: sign * found.gains.kp, ki: sign * found.gains.ki, value: 0.0 };
-    let value = iae(solver, objective, &candidate);
-    Optimum { value, certificate: Certificate { gap: None, ..found.certificate }, ..found }
+    let lead = Lead::of(&found.gains);
+    Candidate { lead, kp: sign * found.gains.kp, ki: sign * found.gains.ki, value: 0.0 }
 }
 
-fn lead_of(found: &Optimum) -> Lead {
-    if found.gains.kd == 0.0 {
-        Lead::NONE
-    } else {
-        Lead { td_s: found.gains.kd / found.gains.kp, tf_s: found.gains.tf_s }
-    }
+/// An optimum for another objective with its IAE.
+fn valued(solver: &Solver<'_>, objective: Objective, found: Optimum) -> Optimum {
+    let value = iae(solver, objective, &candidate_of(solver, &found));
+    Optimum { value, certificate: Certificate { gap: None, ..found.certificate }, ..found }
 }
 
 /// The best Ki of a pure integrator, and the best about a little Kp beside it.
@@ -142,12 +137,10 @@ fn from_integrator(solver: &mut Solver<'_>, objective: Objective) -> Option<Opti
 /// The best that simplexes from some shares of the largest Ki come to, certified; `None` where the exact analysis does not
 /// confirm it.
 fn searched(solver: &mut Solver<'_>, objective: Objective, start: &Optimum) -> Option<Optimum> {
-    let sign = solver.family.sign;
-    let kp = sign * start.gains.kp;
-    if kp == 0.0 {
+    if start.gains.kp == 0.0 {
         return from_integrator(solver, objective);
     }
-    let start = Candidate { lead: lead_of(start), kp, ki: sign * start.gains.ki, value: 0.0 };
+    let start = candidate_of(solver, start);
     searched_from(solver, objective, &start)
 }
 

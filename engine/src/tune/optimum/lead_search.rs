@@ -9,20 +9,17 @@ use super::valley::{Spot, valley};
 /// Td at which the search looks first, in units of 1/ω, ω the frequency at which the loop without derivative action
 /// comes nearest to −1.
 /// Long dead times have a second valley far out, where the derivative is the controller's main part.
-const TDS: [f64; 14] = [0.03, 0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5, 9.0, 15.0, 25.0, 40.0];
+const TDS: [f64; 13] = [0.08, 0.18, 0.35, 0.6, 0.9, 1.3, 2.0, 3.2, 5.5, 9.0, 15.0, 25.0, 40.0];
 /// Tf at which it looks as well where Ju is limited, in the same units: there the controller is one of proportional action
 /// N + 1 times Kp over most frequencies and of less below, which a limit on C S leaves room for. For Tf → ∞ it is the PI.
 const FAR_TFS: [f64; 7] = [2.0, 4.5, 10.0, 22.0, 50.0, 110.0, 250.0];
-/// Td from which on the gains that meet the limits are few, in the same units.
-const FAR: f64 = 5.0;
-/// Tf at which it looks where the filter is free: far out in Td, where Kp is next to nothing, it is Tf that counts.
-const FREE_TFS: [f64; 3] = [0.8, 1.6, 3.2];
-/// Valleys of Td that are followed to their bottom where Ju is limited, and where it is not.
-const MOST_VALLEYS: [usize; 2] = [4, 3];
-/// How much worse than the deepest a valley may look that is followed: a coarse look misjudges by that much.
+/// Valleys of Td that are followed to their bottom.
+const MOST_VALLEYS: usize = 4;
+/// How much worse than the deepest a valley may look that is followed where Ju is not limited: a coarse look misjudges by
+/// that much.
 const MISJUDGED: f64 = 0.5;
 /// N at which it looks first where the filter is free, and its range.
-const RATIOS: [f64; 4] = [1.5, 6.0, 25.0, 80.0];
+const RATIOS: [f64; 3] = [1.5, 6.0, 25.0];
 const RATIOS_HELD: [f64; 4] = [1.0, 1.5, 6.0, 25.0];
 pub(super) const RATIO_RANGE: (f64, f64) = (1.0, 100.0);
 /// How far a refinement may go from where it starts, as a logarithm of Td.
@@ -30,8 +27,6 @@ const FARTHEST: f64 = 1.5;
 /// First step of a refinement, as a logarithm: after the first look, and after points have been added.
 pub(super) const STEP: f64 = 0.2;
 pub(super) const STEP_NEARBY: f64 = 0.01;
-/// Shortest stride along ln Td.
-const SHORTEST: f64 = 2e-3;
 /// Relative widths at which it ends, likewise.
 const LAST: f64 = 1e-3;
 const LAST_NEARBY: f64 = 3e-6;
@@ -56,18 +51,16 @@ pub(super) fn look(
         DerivativeFilter::Free => &RATIOS,
     };
     // Far out few gains meet the limits.
+    let care = if held { Care::Full } else { Care::Coarse };
     let mut valleys: Vec<Candidate> = Vec::new();
     for &n in ratios {
         let mut tds: Vec<f64> = TDS.to_vec();
         if held {
             tds.extend(FAR_TFS.iter().map(|tf| n * tf));
-        } else if filter == DerivativeFilter::Free {
-            tds.extend(FREE_TFS.iter().map(|tf| n * tf).filter(|td| *td > TDS[TDS.len() - 1]));
+            tds.sort_unstable_by(f64::total_cmp);
         }
-        tds.sort_unstable_by(f64::total_cmp);
         let mut seen: Vec<Option<Candidate>> = Vec::with_capacity(tds.len());
         for td in tds {
-            let care = if held || td > FAR { Care::Full } else { Care::Coarse };
             let td_s = td / omega;
             match search.run(on, Lead { td_s, tf_s: td_s / n }, care) {
                 Found::Best(found) => seen.push(Some(found)),
@@ -85,7 +78,7 @@ pub(super) fn look(
     valleys.sort_by(|a, b| a.value.total_cmp(&b.value));
     let least = valleys.first().map_or(0.0, |v| v.value);
     valleys.retain(|v| held || v.value <= least + MISJUDGED * least.abs());
-    valleys.truncate(MOST_VALLEYS[usize::from(!held)]);
+    valleys.truncate(MOST_VALLEYS);
     if valleys.is_empty() { Err(Found::Nothing) } else { Ok(valleys) }
 }
 
@@ -155,23 +148,6 @@ fn along(at: &mut dyn FnMut(f64) -> AtLead, x: f64, step: f64, last: f64) -> Opt
             b = at(m.x + 1.6 * (m.x - a.x));
         } else {
             break;
-        }
-    }
-    // A ridge of gains that only just meet the limits is lost by a long stride and kept by a short one.
-    let mut stride = step;
-    while (a.found.is_none() || b.found.is_none()) && stride > SHORTEST {
-        stride *= 0.4;
-        (a, b) = (at(m.x - stride), at(m.x + stride));
-        for _ in 0..MOST {
-            if a.value() < m.value() {
-                (b, m) = (m, a);
-                a = at(m.x - stride);
-            } else if b.value() < m.value() {
-                (a, m) = (m, b);
-                b = at(m.x + stride);
-            } else {
-                break;
-            }
         }
     }
     // The width is that of a logarithm: absolute here, relative to Td.

@@ -16,6 +16,7 @@
 use super::circles::{Circles, Side};
 use super::points::Points;
 use super::problem::LoopLimits;
+use crate::control::ParallelGains;
 
 /// Td and Tf of a PID controller in seconds; both 0 for PI.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +27,11 @@ pub(super) struct Lead {
 
 impl Lead {
     pub const NONE: Self = Self { td_s: 0.0, tf_s: 0.0 };
+
+    /// Those of a controller of the parallel form.
+    pub fn of(gains: &ParallelGains) -> Self {
+        if gains.kd == 0.0 { Self::NONE } else { Self { td_s: gains.kd / gains.kp, tf_s: gains.tf_s } }
+    }
 
     /// F(∞).
     pub fn high(&self) -> f64 {

@@ -5,15 +5,15 @@
 //! loop that comes from −180° with |L| = ∞ and goes to |L| = 0 within φ of the negative axis passes −1 at no more than
 //! sin φ: neither Ms nor Mt falls below 1 + 2/N, and slow loops with ever less integral action come as near as one likes.
 
-use super::certificate::Limit;
+use super::certificate::{Check, Limit};
 use super::family::Family;
+use super::gain_search::Candidate;
 use super::lead_search::RATIO_RANGE;
 use super::points::Plant;
 use super::problem::{DerivativeFilter, LoopLimits, Objective, Process, Wanted};
 use super::simplex::{Simplex, minimise};
 use super::slice::Lead;
 use super::solve::Solver;
-use super::{certificate::Check, gain_search::Candidate};
 use crate::analyze::{OpenLoop, peaks};
 use crate::control::ParallelGains;
 use crate::model::ProcessModel;

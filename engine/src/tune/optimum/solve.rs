@@ -144,7 +144,7 @@ fn better(a: Found, b: Found) -> Found {
 
 /// Known gains sought afresh at their Td and some about it: far out in Td the gains that meet the limits are so few that
 /// points added meanwhile may have put them elsewhere.
-fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Option<Candidate> {
+fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Candidate {
     let mut best: Option<Candidate> = None;
     for times in [1.0, 0.96, 1.04] {
         let Lead { td_s, tf_s } = known.lead;
@@ -155,7 +155,7 @@ fn afresh(search: &mut GainSearch, on: &Ground<'_, '_>, known: Candidate) -> Opt
             best = Some(found);
         }
     }
-    best
+    best.unwrap_or(known)
 }
 
 /// A problem with its points and workspace.
@@ -189,11 +189,8 @@ impl<'a> Solver<'a> {
     /// Whether ten times these gains stabilise as well.
     fn takes_more(&self, found: &Optimum) -> bool {
         const MORE: f64 = 10.0;
-        let gains = found.gains;
-        let td_s = if gains.kd == 0.0 { 0.0 } else { gains.kd / gains.kp };
-        let lead = if td_s == 0.0 { Lead::NONE } else { Lead { td_s, tf_s: gains.tf_s } };
         let sign = MORE * self.family.sign;
-        self.family.is_stable(lead, sign * gains.kp, sign * gains.ki)
+        self.family.is_stable(Lead::of(&found.gains), sign * found.gains.kp, sign * found.gains.ki)
     }
 
     pub fn controller(&self) -> &'static str {
@@ -238,12 +235,12 @@ impl<'a> Solver<'a> {
     /// About known gains, on the points that bear on them and on those that turn out to.
     fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, step: f64) -> Found {
         let all = &self.family.points;
+        let held = quest.limits.ju.is_finite() && quest.relax.is_none();
         let mut points = all.near(&quest.limits_at(&known), known.lead, known.kp, known.ki);
         let whole = quest.on(&self.family, all);
         let stays = |c: Candidate| c.value <= known.value + LOST * known.value.abs();
-        let again = self.search.at_gain(&whole, known.lead, known.kp).filter(|c| stays(*c));
-        let again = again.or_else(|| afresh(&mut self.search, &whole, known));
-        let known = again.unwrap_or(known);
+        let kept = !held || self.search.at_gain(&whole, known.lead, known.kp).is_some_and(stays);
+        let known = if kept { known } else { afresh(&mut self.search, &whole, known) };
         let mut best: Option<Candidate> = None;
         for trial in 0..TRIALS {
             let on = Ground { points: &points, ..whole };
@@ -265,11 +262,7 @@ impl<'a> Solver<'a> {
             }
             points.extend(&all.near(&quest.limits_at(&found), found.lead, found.kp, found.ki));
         }
-        // What a walk on few points came to may be worth less on all of them than where it began.
-        match (best, again) {
-            (Some(best), Some(again)) if best.value > again.value => Found::Best(again),
-            _ => best.or(again).map_or(Found::Best(known), Found::Best),
-        }
+        best.map_or(Found::Best(known), Found::Best)
     }
 
     /// Where the loop of a candidate comes nearest to −1, in rad/s.
@@ -338,39 +331,14 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// The same from the deepest valley that the first look sees, and from others where it comes to less than they
-    /// promise: on all points a valley may be worth less than on the first ones, or too narrow to stay in.
+    /// The same by one search, which may end in a valley that is not the deepest.
     fn sought(&mut self, objective: Objective) -> Result<Option<Optimum>, OptimumError> {
-        if self.wanted != Wanted::Pi {
-            self.valleys.clear();
-        }
-        let Some(mut best) = self.pursued(objective, None)? else { return Ok(None) };
-        let value = |o: &Optimum| if objective == Objective::Jv { o.value } else { -o.value };
-        let mut valleys = if self.wanted == Wanted::Pi { Vec::new() } else { self.valleys.clone() };
-        valleys.sort_by(|a, b| a.value.total_cmp(&b.value));
-        for valley in valleys {
-            let promises = |best: &Optimum| valley.value < value(best) - LOST * value(best).abs();
-            if !promises(&best) {
-                break;
-            }
-            let found = self.pursued(objective, Some(valley)).ok().flatten();
-            best = found.filter(|found| value(found) < value(&best)).unwrap_or(best);
-        }
-        Ok(Some(best))
-    }
-
-    /// The same by one search, from known gains or without a start.
-    fn pursued(
-        &mut self,
-        objective: Objective,
-        start: Option<Candidate>,
-    ) -> Result<Option<Optimum>, OptimumError> {
         // Two integrators in the loop: ∫ ln|T|/ω² dω ≥ 0, so |T| passes 1 somewhere.
         let integrates = self.family.plants.iter().any(|p| p.low.power < 0);
         if integrates && self.limits.mt <= 1.0 + LEAST_MT {
             return Ok(None);
         }
-        let mut known = start;
+        let mut known: Option<Candidate> = None;
         let mut excess = f64::INFINITY;
         let quest = Quest { objective, limits: self.limits, relax: None };
         // The best that all but met the limits: a deep valley may be too narrow to follow from round to round.
