@@ -17,7 +17,7 @@ use vasos_engine::signal::{ChannelSet, SampleBlock};
 use super::frames::{self, Damage};
 use super::layout::{EVENTS, MODELS, SIGNALS, TIME, TOLD, groups};
 use super::notes::MODEL;
-use super::seal::{self, CHECKS, Check, is_whole};
+use super::seal::{self, CHECKS, Check, has_sum, is_whole};
 use super::told::{self, Beginning, Heard, ToldModel, heard};
 use super::trouble::{RecordingError, RecordingFlaw};
 
@@ -75,12 +75,18 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
     let mut known: BTreeMap<String, usize> = BTreeMap::new();
     let mut damages: Vec<(usize, Damage)> = vec![];
     for (place, path) in parts.0.iter().enumerate() {
-        let read = read_messages(path, |id, chunk| {
+        let read = read_messages(path, |id, is_recording, chunk| {
             // A part holds runs of the first file and those that began after it.
             let index = *known.entry(id.to_owned()).or_insert_with(|| {
-                stores.push(Store { part: place, ..Store::default() });
+                stores.push(Store {
+                    id: id.to_owned(),
+                    order: stores.len(),
+                    part: place,
+                    ..Store::default()
+                });
                 stores.len() - 1
             });
+            stores[index].messages[usize::from(is_recording)] += 1;
             if let Some(chunk) = chunk {
                 stores[index].take(&chunk, place);
             }
@@ -92,6 +98,8 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
             Err(_) => {}
         }
     }
+    let mut stores = joined(stores);
+    stores.retain(|store| store.messages[1] > 0);
     if stores.is_empty() {
         return Err(RecordingError::Nothing { path: first });
     }
@@ -103,10 +111,17 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
         .collect();
     let mut runs = vec![];
     for store in stores.into_iter().filter(|store| used.contains(&store.part)) {
-        if let Some((run, altered)) = store.run(&first)? {
-            flaws.extend(gap(&run));
-            flaws.extend(altered);
-            runs.push(run);
+        let orphaned = RecordingFlaw::TextsAltered { run: store.id.clone(), texts: 1 };
+        let has_rows = !store.rows.is_empty();
+        match store.run(&first)? {
+            Some((run, altered)) => {
+                flaws.extend(gap(&run));
+                flaws.extend(altered);
+                runs.push(run);
+            }
+            // Rows of which no settings tell what they are.
+            None if has_rows => flaws.push(orphaned),
+            None => {}
         }
     }
     if runs.is_empty() {
@@ -114,6 +129,29 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
     }
     let files = parts.0.iter().enumerate().filter(|(place, _)| used.contains(place));
     Ok(Recorded { runs, files: files.map(|(_, file)| file.clone()).collect(), flaws })
+}
+
+/// Stores whose ids differ in one character, or in a message's kind, are one: a bit flipped. What comes of it is said.
+fn joined(stores: Vec<Store>) -> Vec<Store> {
+    let mut kept: Vec<Store> = vec![];
+    let mut ordered = stores;
+    ordered.sort_by_key(|store| std::cmp::Reverse(store.messages[1]));
+    for store in ordered {
+        let alike = |a: &str, b: &str| {
+            a.len() == b.len() && a.bytes().zip(b.bytes()).filter(|(a, b)| a != b).count() == 1
+        };
+        match kept.iter_mut().find(|other| alike(&other.id, &store.id)) {
+            Some(other) => other.join(store),
+            None => kept.push(store),
+        }
+    }
+    kept.sort_by_key(|store| store.order);
+    for store in &mut kept {
+        if store.messages[1] > 0 {
+            store.strays += store.messages[0];
+        }
+    }
+    kept
 }
 
 /// Rows that are missing in the middle of a run: a disk that was full, a part that is not there.
@@ -147,20 +185,17 @@ fn used_parts(stores: &[Store]) -> HashSet<usize> {
     }
 }
 
-/// Hands over what each message is of: the id of its recording, and its chunk where it is one.
-fn read_messages(path: &Path, mut take: impl FnMut(&str, Option<Chunk>)) -> Result<Damage, String> {
+/// Hands over what each message is of: the id of its store, whether that is a recording, and its chunk where it is one.
+fn read_messages(path: &Path, mut take: impl FnMut(&str, bool, Option<Chunk>)) -> Result<Damage, String> {
     let mut unreadable = 0;
     let mut damage = frames::read(path, |message| {
-        let id = message.store_id().clone();
-        if !id.is_recording() {
-            return;
-        }
-        let id = id.recording_id().to_string();
+        let store = message.store_id().clone();
+        let (id, is_recording) = (store.recording_id().to_string(), store.is_recording());
         match &message {
-            LogMsg::SetStoreInfo(_) => take(&id, None),
+            LogMsg::SetStoreInfo(_) => take(&id, is_recording, None),
             // Arrow panics on columns that do not fit together.
             LogMsg::ArrowMsg(_, arrow) => match frames::quietly(|| Chunk::from_arrow_msg(arrow)) {
-                Some(Ok(chunk)) => take(&id, Some(chunk)),
+                Some(Ok(chunk)) => take(&id, is_recording, Some(chunk)),
                 _ => unreadable += 1,
             },
             LogMsg::BlueprintActivationCommand(_) => {}
@@ -180,6 +215,13 @@ struct Rows {
 /// What the messages of one run come to.
 #[derive(Default)]
 struct Store {
+    id: String,
+    /// Place among the stores, by their first messages.
+    order: usize,
+    /// Messages of it as a blueprint, and as a recording.
+    messages: [usize; 2],
+    /// Messages that came under another id or kind.
+    strays: usize,
     name: String,
     /// First part with this run.
     part: usize,
@@ -235,6 +277,40 @@ impl Store {
         }
     }
 
+    /// Takes in what came under an id that a bit made another.
+    fn join(&mut self, other: Self) {
+        self.strays += other.messages.iter().sum::<usize>();
+        (self.part, self.order) = (self.part.min(other.part), self.order.min(other.order));
+        self.parts.extend(other.parts);
+        self.chunks.extend(other.chunks);
+        self.rows.extend(other.rows);
+        self.events.extend(other.events);
+        self.models.extend(other.models);
+        self.checks.extend(other.checks);
+        self.rig = self.rig.take().or(other.rig);
+        self.rig_file = self.rig_file.take().or(other.rig_file);
+        self.start = self.start.take().or(other.start);
+        self.number = self.number.take().or(other.number);
+        if self.name.is_empty() {
+            self.name = other.name;
+        }
+    }
+
+    /// Whether the texts of this run were written with sums: one of its settings has one.
+    fn has_sums(&self) -> bool {
+        [&self.rig_file, &self.start].into_iter().flatten().any(|text| has_sum(text))
+    }
+
+    /// Settings that are not there beside others that are: the name of one is not what it was.
+    fn missing_settings(&self) -> usize {
+        let there = [&self.rig_file, &self.start, &self.number].map(Option::is_some);
+        if there.contains(&true) {
+            there.iter().chain([&self.rig.is_some()]).filter(|there| !**there).count()
+        } else {
+            0
+        }
+    }
+
     /// The run, and what of it is not as it was written; `None` for a recording of something else.
     fn run(mut self, path: &str) -> Result<Option<(RecordedRun, Vec<RecordingFlaw>)>, RecordingError> {
         let unreadable = |reason: String| RecordingError::Read { path: path.to_owned(), reason };
@@ -243,7 +319,7 @@ impl Store {
                 .map_err(|error| unreadable(format!("its rig is not readable: {}", error.message())))?;
             Network::new(spec).map(Arc::new).map_err(|error| unreadable(error.to_string()))
         });
-        let altered = self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[]));
+        let altered = self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[], self.has_sums()));
         let network = match (of_file, &self.rig) {
             (Some(Ok(network)), _) => network,
             // The rows of a damaged rig file are those of the preset that it was, where it was one.
@@ -264,7 +340,7 @@ impl Store {
             network.spec.configurations.iter().position(|c| c.id == beginning.configuration)
         });
         let number = self.number.as_deref().and_then(|n| n.parse().ok()).unwrap_or(0);
-        let mut altered_texts = self.altered_texts();
+        let mut altered_texts = self.altered_texts() + self.missing_settings() + self.strays;
         let heard = self.take_events();
         altered_texts += heard.iter().filter(|(_, heard)| !heard.whole).count();
         let numbers: HashSet<u64> = heard.iter().filter_map(|(_, heard)| heard.number).collect();
@@ -299,12 +375,13 @@ impl Store {
     /// the settings, which are kept.
     fn altered_texts(&mut self) -> usize {
         let before = self.checks.len() + self.models.len();
-        self.checks.retain(|text| is_whole(text, &[]));
-        self.models.retain(|(_, text)| is_whole(text, &[]));
+        let sums = self.has_sums();
+        self.checks.retain(|text| is_whole(text, &[], sums));
+        self.models.retain(|(_, text)| is_whole(text, &[], sums));
         let beside = [self.rig.as_deref().unwrap_or_default(), self.number.as_deref().unwrap_or_default()];
         let settings = [
-            self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[])),
-            self.start.as_ref().is_some_and(|text| !is_whole(text, &beside)),
+            self.rig_file.as_ref().is_some_and(|text| !is_whole(text, &[], sums)),
+            self.start.as_ref().is_some_and(|text| !is_whole(text, &beside, sums)),
         ];
         before - self.checks.len() - self.models.len()
             + settings.into_iter().filter(|altered| *altered).count()
@@ -313,10 +390,11 @@ impl Store {
     /// Times in nanoseconds, and what is told at them.
     fn take_events(&mut self) -> Vec<(i64, Heard)> {
         let mut seen: HashSet<(i64, String, String)> = HashSet::new();
+        let sums = self.has_sums();
         let all = std::mem::take(&mut self.events).into_iter();
         // Parts that were tidied up have the same events in other chunks.
         let once: Vec<_> = all.filter(|event| seen.insert(event.clone())).collect();
-        once.into_iter().map(|(time, words, told)| (time, heard(&told, words))).collect()
+        once.into_iter().map(|(time, words, told)| (time, heard(&told, words, sums))).collect()
     }
 }
 

@@ -36,9 +36,15 @@ pub(super) fn sealed(text: &str, beside: &[&str]) -> String {
     format!("{text}{}", sum(&parts))
 }
 
-/// Whether a text, and what stands beside it, is as it was written; texts from before they had sums count as such.
-pub(super) fn is_whole(text: &str, beside: &[&str]) -> bool {
-    let Some(at) = text.rfind(MARK) else { return true };
+/// Whether a text has a sum.
+pub(super) fn has_sum(text: &str) -> bool {
+    text.contains(MARK)
+}
+
+/// Whether a text, and what stands beside it, is as it was written. One without a sum counts as such where the run's have
+/// none (`sums`), as in recordings from before.
+pub(super) fn is_whole(text: &str, beside: &[&str], sums: bool) -> bool {
+    let Some(at) = text.rfind(MARK) else { return !sums };
     let (text, found) = text.split_at(at);
     let mut parts = beside.to_vec();
     parts.push(text);
@@ -146,13 +152,16 @@ mod tests {
     fn a_sealed_text_shows_every_change() {
         let text = "kc = 7.0\n";
         let sealed = sealed(text, &["words"]);
-        assert!(is_whole(&sealed, &["words"]) && is_whole(text, &[]) && is_whole("", &[]));
-        assert!(!is_whole(&sealed, &["wordt"]));
+        assert!(
+            is_whole(&sealed, &["words"], true) && is_whole(text, &[], false) && is_whole("", &[], false)
+        );
+        assert!(!is_whole(text, &[], true));
+        assert!(!is_whole(&sealed, &["wordt"], true));
         assert_eq!(toml::from_str::<toml::Table>(&sealed), toml::from_str(text));
         for at in 0..text.len() {
             let mut changed = sealed.clone().into_bytes();
             changed[at] ^= 1;
-            assert!(!is_whole(&String::from_utf8(changed).expect("ASCII"), &["words"]), "{at}");
+            assert!(!is_whole(&String::from_utf8(changed).expect("ASCII"), &["words"], true), "{at}");
         }
     }
 

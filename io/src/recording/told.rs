@@ -93,8 +93,9 @@ pub(super) struct Heard {
 }
 
 /// The event that a text tells; its words where there is no more, or what there is has been changed.
-pub(super) fn heard(text: &str, words: String) -> Heard {
-    let whole = is_whole(text, &[&words]);
+/// `sums`: as [`is_whole`] has it.
+pub(super) fn heard(text: &str, words: String, sums: bool) -> Heard {
+    let whole = is_whole(text, &[&words], sums);
     let told: Option<Told> = toml::from_str(text).ok().filter(|_| whole);
     let number = told.as_ref().and_then(|told| told.number);
     Heard { kind: event_kind(told.unwrap_or_default(), words), number, whole }
@@ -149,16 +150,16 @@ mod tests {
         ]);
         for kind in kinds {
             let text = told(&kind, 7, "words");
-            let heard = heard(&text, "words".to_owned());
+            let heard = heard(&text, "words".to_owned(), true);
             assert_eq!(heard, Heard { kind, number: Some(7), whole: true }, "{text}");
         }
         let words = || "a test ended".to_owned();
         for nonsense in ["", "command = 3", "[command.setpoint]\ntag = 1", "\u{0}"] {
             let kind = EventKind::Recorded { words: words(), test_over: None };
-            assert_eq!(heard(nonsense, words()), Heard { kind, number: None, whole: true });
+            assert_eq!(heard(nonsense, words(), false), Heard { kind, number: None, whole: true });
         }
         let text = told(&EventKind::Running, 0, "running");
-        let heard = heard(&text.replace("true", "false"), "running".to_owned());
+        let heard = heard(&text.replace("true", "false"), "running".to_owned(), true);
         let kind = EventKind::Recorded { words: "running".to_owned(), test_over: None };
         assert_eq!(heard.kind, kind, "changed: not carried out");
         assert!(!heard.whole);
