@@ -37,6 +37,7 @@ mod quotes;
 mod read;
 mod recorded;
 mod repair;
+mod repair_words;
 mod report;
 mod role_words;
 mod roles;

@@ -73,13 +73,13 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         figures(ui, row);
     });
     let others = others(ui, view, row);
-    if !view.tuning.compared.is_empty() && state.shown != 4 {
+    if !view.tuning.compared.is_empty() {
         let names: Vec<(String, egui::Color32)> = others.iter().map(|o| (o.0.clone(), o.1)).collect();
         plots::legend(ui, &title(row), theme::palette(ui).pv, &names);
     }
     match state.shown {
         0 => return nyquist(ui, view, state, model, row, &others),
-        4 => pole_map::ui(ui, model, row),
+        4 => pole_map::ui(ui, model, row, &others),
         shown => {
             let tunings = over_frequency::Tunings { model, row, others: &others };
             over_frequency::ui(ui, shown, &tunings, &mut state.curves);
