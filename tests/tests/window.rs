@@ -494,3 +494,59 @@ fn tunings_are_overlaid_made_calmer_and_given_a_setpoint_weight() {
     picture(&mut harness, "tunings_overlaid_1280x720_light");
     results.extend_harness(&mut harness);
 }
+
+/// The speed of a rule's loop is taken hold of where its response is at 63 %; one undo takes a whole drag back.
+#[test]
+fn the_speed_of_the_loop_is_dragged_in_its_step_response() {
+    use eframe::egui::{CursorIcon, PointerButton, pos2};
+    let mut results = egui_kittest::SnapshotResults::new();
+    let mut harness = window([1280.0, 720.0]);
+    act(&mut harness, typed_model());
+    harness.run_steps(3);
+    let row = |h: &Window| h.state().tuning().find("lambda", "pi").expect("a row").clone();
+    let before = row(&harness);
+    let candidate = Candidate { rule: "lambda".to_owned(), controller: "pi".to_owned(), gains: before.gains };
+    act(&mut harness, Action::Document(DocumentCommand::Candidate(Some(candidate))));
+    act(&mut harness, Action::Maximise(PaneKind::Step));
+    harness.run_steps(3);
+    let handle_x = |h: &mut Window, y: f32| {
+        (20..1240).step_by(4).map(|x| x as f32).find(|x| {
+            h.hover_at(pos2(*x, y));
+            h.run_steps(2);
+            h.output().platform_output.cursor_icon == CursorIcon::ResizeHorizontal
+        })
+    };
+    const Y: f32 = 300.0;
+    let x = handle_x(&mut harness, Y).expect("a handle under the pointer") + 8.0;
+    harness.hover_at(pos2(x, Y));
+    harness.run_steps(2);
+    harness.event(eframe::egui::Event::PointerButton {
+        pos: pos2(x, Y),
+        button: PointerButton::Primary,
+        pressed: true,
+        modifiers: eframe::egui::Modifiers::NONE,
+    });
+    harness.run_steps(2);
+    for dx in [20.0, 60.0, 100.0] {
+        harness.hover_at(pos2(x + dx, Y));
+        harness.run_steps(2);
+    }
+    let dragged = row(&harness);
+    harness.remove_cursor();
+    picture(&mut harness, "step_speed_1280x720");
+    harness.event(eframe::egui::Event::PointerButton {
+        pos: pos2(x + 100.0, Y),
+        button: PointerButton::Primary,
+        pressed: false,
+        modifiers: eframe::egui::Modifiers::NONE,
+    });
+    harness.run_steps(3);
+    let seconds = |row: &vasos_app::tuning::Row| row.tau_c_s.expect("a time constant");
+    assert!(seconds(&dragged) > 1.3 * seconds(&before), "{before:?} {dragged:?}");
+    assert!(dragged.gains.kc < before.gains.kc && dragged.analysis.ms < before.analysis.ms);
+    assert_eq!(seconds(&row(&harness)), seconds(&dragged));
+    act(&mut harness, Action::Undo);
+    harness.run_steps(2);
+    assert_eq!(row(&harness).gains, before.gains, "one undo takes the drag back");
+    results.extend_harness(&mut harness);
+}

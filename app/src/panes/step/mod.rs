@@ -2,6 +2,7 @@
 //! makes of them, and on the non-linear rig.
 
 mod on_rig;
+mod speed;
 
 use eframe::egui::{self, RichText};
 use egui_plot::{Line, Plot, PlotPoints, Polygon};
@@ -17,6 +18,7 @@ use crate::panes::tune::{row_in_view, title};
 use crate::tuning::{PRESENT, Row};
 use crate::widgets::segmented;
 use crate::{plots, text, theme, tr};
+use speed::Handle;
 
 /// State of the pane.
 #[derive(Default)]
@@ -26,6 +28,8 @@ pub struct State {
     /// The band last shown, until the next is worked out.
     band: Option<std::sync::Arc<Reply>>,
     cached: Vec<Cached>,
+    /// The speed of the loop is being dragged.
+    drag: Option<speed::Drag>,
 }
 
 struct Cached {
@@ -96,6 +100,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
     let first = state.response(model, &row.gains, b, None);
     let settling = first.metrics().ok().and_then(|m| m.settling_time_s);
     let horizon_s = settling.filter(|s| *s > 0.0).map(|s| 1.8 * s);
+    let horizon_s = state.drag.map_or(horizon_s, |drag| Some(drag.axis_s));
     let response = state.response(model, &row.gains, b, horizon_s);
     let shown_s = response.time_s.last().copied();
     let present = view.tuning.rows.first().filter(|r| r.rule == PRESENT && r.gains != row.gains);
@@ -109,7 +114,7 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         let response = state.response(model, &other.gains, 1.0, shown_s);
         others.push((title(other), theme::series(&p, k + 1), response));
     }
-    let (band, actions) = band(view, state, model, row, shown_s);
+    let (band, mut actions) = band(view, state, model, row, shown_s);
     let names: Vec<(String, egui::Color32)> = others.iter().map(|(n, c, _)| (n.clone(), *c)).collect();
     // The tuning in use alone, in grey, needs no names.
     if !view.tuning.compared.is_empty() {
@@ -121,9 +126,18 @@ pub fn ui(ui: &mut egui::Ui, view: &View, state: &mut State) -> Vec<Action> {
         .model()
         .map_or((String::new(), String::new()), |e| (e.pv_unit.clone(), e.mv_unit.clone()));
     let legend = !view.tuning.compared.is_empty();
-    let drawn = Drawn { response: &response, others: &others, legend, band: band.as_ref() };
-    curves(ui, true, 0.58 * height, &drawn, &units, state.load);
+    let handle = if state.load { None } else { Handle::of(row, model.dead_time_s()) };
+    let dragging = state.drag.is_some();
+    let drawn = Drawn { response: &response, others: &others, legend, band: band.as_ref(), handle, dragging };
+    let shown = curves(ui, true, 0.58 * height, &drawn, &units, state.load);
     curves(ui, false, 0.42 * height, &drawn, &units, state.load);
+    match handle {
+        Some(handle) => {
+            let axis_s = shown_s.unwrap_or_default();
+            actions.extend(handle.drag(ui, &mut state.drag, axis_s, &shown));
+        }
+        None => state.drag = None,
+    }
     figures(ui, row, &first, state.load, &units);
     if let Some(band) = &band {
         let p = theme::palette(ui);
@@ -148,6 +162,9 @@ struct Drawn<'a> {
     /// Name, colour and response of those beside it.
     others: &'a [(String, egui::Color32, std::rc::Rc<Response>)],
     band: Option<&'a TuningSpread>,
+    /// The speed that the rule was asked for, and whether it is being dragged.
+    handle: Option<Handle>,
+    dragging: bool,
 }
 
 /// What the uncertainty of the model's fit makes of the tuning in view, asked for where it is not known.
@@ -185,7 +202,7 @@ fn curves(
     drawn: &Drawn<'_>,
     (pv_unit, mv_unit): &(String, String),
     load: bool,
-) {
+) -> egui_plot::PlotResponse<()> {
     let p = theme::palette(ui);
     let points = |r: &Response| -> PlotPoints<'static> {
         let values = if is_pv { &r.y } else { &r.u };
@@ -199,6 +216,7 @@ fn curves(
     let mut plot = Plot::new(if is_pv { "step_y" } else { "step_u" })
         .height(height.max(50.0))
         .allow_scroll(false)
+        .allow_drag(!drawn.dragging)
         .custom_y_axes(vec![plots::y_axis(format!("{}{unit}", if is_pv { "PV" } else { "MV" }))])
         .grid_color(p.grid)
         .x_grid_spacer(plots::x_marks)
@@ -217,7 +235,10 @@ fn curves(
             plot.line(Line::new(name.clone(), points(other)).color(*colour).width(1.2));
         }
         plot.line(Line::new(tr!("step.in_view"), points(drawn.response)).color(colour).width(theme::LINE));
-    });
+        if let Some(handle) = drawn.handle.filter(|_| is_pv) {
+            handle.draw(plot, &p);
+        }
+    })
 }
 
 /// From the lower edge of a band along and back along the upper one, as far as both are finite.

@@ -40,7 +40,7 @@ const FREE_START_RATIO: f64 = 3.0;
 const KP_STEPS: i32 = 10;
 const KP_STEP: f64 = 1.2;
 const KP_HALVINGS: u32 = 12;
-/// Processes that are taken in one by one before all are simulated, and the relative difference that does not count.
+/// Processes that are taken in one by one before all are simulated, and the relative difference of IAE that does not count.
 const MOST_WORST: usize = 6;
 const SAME: f64 = 1e-4;
 const SIMPLEX: Simplex = Simplex { step: 0.2, last_step: 2e-5, most_evaluations: 160 };
@@ -129,7 +129,8 @@ fn from_integrator(solver: &mut Solver<'_>, objective: Objective) -> Option<Opti
     let kp = BESIDE_INTEGRATOR * best.ki / solver.nearest_omega(&best);
     let beside = searched_from(solver, objective, &Candidate { kp, ..best });
     match (alone, beside) {
-        (Some(alone), Some(beside)) if beside.value < alone.value => Some(beside),
+        // A Kp that gains nothing is none.
+        (Some(alone), Some(beside)) if beside.value < alone.value * (1.0 - SAME) => Some(beside),
         (alone, beside) => alone.or(beside),
     }
 }
