@@ -1,6 +1,6 @@
 //! Recordings back as runs: what a replay shows is what was, whatever became of the file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -15,8 +15,8 @@ use vasos_engine::sim::ClosedLoop;
 use vasos_io::export::write_recorded;
 use vasos_io::log::{ImportOptions, Repair, open_log};
 use vasos_io::recording::{
-    ModelNote, Note, Parts, Recording, RecordingError, RecordingFlaw, RecordingOptions, RecordingTrouble,
-    read_recorded, read_runs,
+    ModelNote, Note, Parts, Recorded, Recording, RecordingError, RecordingFlaw, RecordingOptions,
+    RecordingTrouble, read_recorded, read_runs,
 };
 use vasos_io::rig::{PRESETS, preset};
 
@@ -284,6 +284,10 @@ fn a_recording_that_grows_goes_on_in_files_that_open_by_themselves() {
         sum += alone[0].len();
     }
     assert_eq!(sum as u64, rows);
+    let flaws = |parts: &[PathBuf]| read_recorded(&Parts(parts.to_vec())).expect("reads").flaws;
+    assert_eq!(flaws(&parts), []);
+    let without_last = flaws(&parts[..parts.len() - 1]);
+    assert!(matches!(without_last[..], [RecordingFlaw::NoEnd { .. }]), "{without_last:?}");
     let last = read_runs(&Parts(vec![parts[parts.len() - 1].clone()])).expect("reads");
     assert_eq!(setpoints(&last[0]), 1, "a part knows the commands before it");
 }
@@ -323,9 +327,11 @@ fn of_a_file_that_was_cut_off_everything_whole_opens() {
         for end in (0..bytes.len()).step_by(1000).chain([bytes.len()]) {
             std::fs::write(&cut, &bytes[..end]).expect("written");
             let begun = Instant::now();
-            match read_runs(&Parts::of(&cut)) {
-                Ok(runs) => {
+            match read_recorded(&Parts::of(&cut)) {
+                Ok(Recorded { runs, flaws, .. }) => {
                     opened += 1;
+                    // Also where the cut falls between two messages.
+                    assert_eq!(flaws.is_empty(), end == bytes.len(), "{end} bytes: {flaws:?}");
                     let run = &runs[0];
                     let rows = run.len();
                     assert!(rows >= before, "{rows} rows of {end} bytes, {before} of fewer");

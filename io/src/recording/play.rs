@@ -127,6 +127,10 @@ pub fn read_recorded(parts: &Parts) -> Result<Recorded, RecordingError> {
     if runs.is_empty() {
         return Err(RecordingError::NoRig { path: first });
     }
+    // A file that ends in the middle says the same of its last run.
+    if flaws.iter().any(|flaw| matches!(flaw, RecordingFlaw::Cut { .. })) {
+        flaws.retain(|flaw| !matches!(flaw, RecordingFlaw::NoEnd { .. }));
+    }
     let files = parts.0.iter().enumerate().filter(|(place, _)| used.contains(place));
     Ok(Recorded { runs, files: files.map(|(_, file)| file.clone()).collect(), flaws })
 }
@@ -355,7 +359,14 @@ impl Store {
         let name = std::mem::take(&mut self.name);
         let checks: Vec<Check> = self.checks.iter().filter_map(|text| toml::from_str(text).ok()).collect();
         let (time_ns, rows) = block(self.rows, &network, number);
+        let has_end = checks.iter().any(|check| check.is_last);
         let mut flaws = altered_rows(&name, checks, &time_ns, &rows, &numbers);
+        if !has_end && beginning.as_ref().is_some_and(|beginning| beginning.tells_end) {
+            flaws.push(RecordingFlaw::NoEnd {
+                run: name.clone(),
+                last_s: rows.time_s.last().copied().unwrap_or(0.0),
+            });
+        }
         if altered_texts > 0 {
             flaws.push(RecordingFlaw::TextsAltered { run: name.clone(), texts: altered_texts });
         }

@@ -62,6 +62,9 @@ pub(super) struct Check {
     /// Numbers of the first event and of the one after the last.
     pub first_event: u64,
     pub next_event: u64,
+    /// Whether the run ends here.
+    #[serde(default)]
+    pub is_last: bool,
 }
 
 impl Check {
@@ -79,7 +82,8 @@ impl Check {
             add_row(&mut hasher, time_ns, row(at));
         }
         let is_complete = || (self.first_event..self.next_event).all(|n| events.contains(&n));
-        (to - from) as u64 == self.rows && hasher.finalize() == self.crc32 && is_complete()
+        let rows_hold = (to - from) as u64 == self.rows && hasher.finalize() == self.crc32;
+        (self.rows == 0 || rows_hold) && is_complete()
     }
 }
 
@@ -101,12 +105,20 @@ pub(super) struct Sealing {
 
 impl Sealing {
     pub fn new() -> Self {
-        Self::from_event(0)
+        Self::after(0, 0)
     }
 
-    fn from_event(number: u64) -> Self {
-        let check =
-            Check { from_ns: 0, to_ns: 0, rows: 0, crc32: 0, first_event: number, next_event: number };
+    /// Behind a row and an event.
+    fn after(time_ns: i64, number: u64) -> Self {
+        let check = Check {
+            from_ns: time_ns,
+            to_ns: time_ns,
+            rows: 0,
+            crc32: 0,
+            first_event: number,
+            next_event: number,
+            is_last: false,
+        };
         Self { hasher: Hasher::new(), check, begun: Instant::now() }
     }
 
@@ -131,16 +143,16 @@ impl Sealing {
 
     /// Forgets what was summed up: not all of it is in the file.
     pub fn restart(&mut self) {
-        *self = Self::from_event(self.check.next_event);
+        *self = Self::after(self.check.to_ns, self.check.next_event);
     }
 
-    /// The sum so far; the next one begins. `None` where there is no row.
-    pub fn take(&mut self) -> Option<Check> {
-        if self.check.rows == 0 {
+    /// The sum so far; the next one begins. `None` where there is no row and the run goes on.
+    pub fn take(&mut self, is_last: bool) -> Option<Check> {
+        if self.check.rows == 0 && !is_last {
             return None;
         }
-        let done = std::mem::replace(self, Self::from_event(self.check.next_event));
-        Some(Check { crc32: done.hasher.finalize(), ..done.check })
+        let done = std::mem::replace(self, Self::after(self.check.to_ns, self.check.next_event));
+        Some(Check { crc32: done.hasher.finalize(), is_last, ..done.check })
     }
 }
 
@@ -170,12 +182,12 @@ mod tests {
         let rows = [[1.0, f64::NAN], [2.0, -0.5], [3.0, 0.0]];
         let time_ns = [5, 10, 15];
         let mut sealing = Sealing::new();
-        assert_eq!(sealing.take(), None);
+        assert_eq!(sealing.take(false), None);
         assert_eq!(sealing.number_event(), 0);
         for (time, row) in time_ns.iter().zip(&rows) {
             sealing.add(*time, row);
         }
-        let check = sealing.take().expect("rows");
+        let check = sealing.take(false).expect("rows");
         let events = HashSet::from([0]);
         let holds = |time_ns: &[i64], rows: &[[f64; 2]]| check.holds(time_ns, |i| &rows[i][..], &events);
         assert!(holds(&time_ns, &rows));
@@ -186,5 +198,7 @@ mod tests {
         // Rows beyond it belong to another sum.
         assert!(holds(&[1, 5, 10, 15, 20], &[[9.0; 2], rows[0], rows[1], rows[2], [9.0; 2]]));
         assert_eq!(sealing.number_event(), 1, "numbers go on");
+        let last = sealing.take(true).expect("an end");
+        assert!(last.is_last && last.rows == 0 && last.holds(&[], |_| &[], &HashSet::from([0, 1])));
     }
 }

@@ -23,6 +23,9 @@ pub(super) const RUN: &str = "run";
 pub(super) struct Beginning {
     /// Id of the configuration.
     pub configuration: String,
+    /// Whether the last check sum of the run says that it is the last: it did not in recordings from before.
+    #[serde(default)]
+    pub tells_end: bool,
     /// Imperfections that are on.
     pub measurement: Option<Measurement>,
 }
@@ -32,6 +35,7 @@ pub(super) fn property(start: &RunStart) -> Result<AnyValues, toml::ser::Error> 
     let configuration = start.network.spec.configurations.get(start.configuration);
     let beginning = Beginning {
         configuration: configuration.map_or_else(String::new, |c| c.id.clone()),
+        tells_end: true,
         measurement: start.measurement,
     };
     let (rig, run) = (start.network.spec.id.as_str(), start.run.to_string());

@@ -167,6 +167,16 @@ pub enum RecordingFlaw {
         /// Time in seconds of the last one.
         to_s: f64,
     },
+    /// The run was not ended.
+    #[error(
+        "{run} has no end: it is still being recorded, the recorder was killed, or its last file is missing; what came after {} s is not there", number(*.last_s)
+    )]
+    NoEnd {
+        /// Name of the run.
+        run: String,
+        /// Time of the last row in seconds; 0 where there is none.
+        last_s: f64,
+    },
     /// Texts whose check sum differs.
     #[error(
         "{run}: {texts} of its settings, commands, events and models are not as they were written: the file was changed or damaged; commands among them are not carried out"
@@ -186,6 +196,7 @@ impl Explain for RecordingFlaw {
             Self::Damaged { .. } => "recording.damaged",
             Self::Gap { .. } => "recording.gap",
             Self::RowsAltered { .. } => "recording.rows_altered",
+            Self::NoEnd { .. } => "recording.no_end",
             Self::TextsAltered { .. } => "recording.texts_altered",
         }
     }
@@ -205,6 +216,7 @@ impl Explain for RecordingFlaw {
             Self::RowsAltered { run, from_s, to_s } => {
                 vec![("run", run.clone()), ("from_s", number(*from_s)), ("to_s", number(*to_s))]
             }
+            Self::NoEnd { run, last_s } => vec![("run", run.clone()), ("last_s", number(*last_s))],
             Self::TextsAltered { run, texts } => vec![("run", run.clone()), ("texts", texts.to_string())],
         }
     }
@@ -221,6 +233,7 @@ impl RecordingFlaw {
             Self::Damaged { path: path(), at: 12_000, messages: 3 },
             Self::Gap { run: run(), from_s: 12.0, missing_s: 3.5, gaps: 2 },
             Self::RowsAltered { run: run(), from_s: 30.0, to_s: 60.0 },
+            Self::NoEnd { run: run(), last_s: 412.6 },
             Self::TextsAltered { run: run(), texts: 1 },
         ]
     }

@@ -120,7 +120,7 @@ impl Writer {
             }
         }
         self.flush();
-        self.seal();
+        self.seal(true);
         self.run = None;
         self.output.finish();
     }
@@ -129,7 +129,7 @@ impl Writer {
         match message {
             Message::Run(start) => {
                 self.flush();
-                self.seal();
+                self.seal(true);
                 self.output.keep(Keep::Open);
                 let begun = self.begin(&start);
                 self.output.keep(Keep::Write);
@@ -231,17 +231,17 @@ impl Writer {
         }
         let full = self.part_bytes.filter(|most| self.output.is_over(*most));
         if full.is_some() || run.sealing.is_due() {
-            self.seal();
+            self.seal(false);
         }
         if full.is_some() {
             self.output.rotate();
         }
     }
 
-    /// Logs the check sum of the rows since the last one.
-    fn seal(&mut self) {
+    /// Logs the check sum of the rows since the last one; `is_last` where the run ends with them.
+    fn seal(&mut self, is_last: bool) {
         let Some(run) = &mut self.run else { return };
-        if let Err(error) = run.send_water().and_then(|()| run.log_check()) {
+        if let Err(error) = run.send_water().and_then(|()| run.log_check(is_last)) {
             self.report(&*error);
         }
     }
@@ -344,8 +344,8 @@ impl Run {
         })
     }
 
-    fn log_check(&mut self) -> LogResult {
-        let Some(check) = self.sealing.take() else { return Ok(()) };
+    fn log_check(&mut self, is_last: bool) -> LogResult {
+        let Some(check) = self.sealing.take(is_last) else { return Ok(()) };
         self.stream.set_time(TIME, rerun::TimeCell::from_duration_nanos(check.to_ns));
         let text = seal::sealed(&toml::to_string(&check)?, &[]);
         let rows = rerun::AnyValues::default().with_component::<rerun::components::Text>(seal::ROWS, [text]);
