@@ -25,7 +25,7 @@ const STEPS_BELOW: i32 = 8;
 /// Relative width of the bracket of Kp at which the search ends.
 const FINE: f64 = 3e-8;
 const COARSE: f64 = 3e-4;
-/// Half width of the bracket about a known optimum, relative.
+/// Half width of the first bracket about a known optimum, relative.
 const NEARBY: f64 = 0.03;
 
 /// How carefully a search is done.
@@ -39,8 +39,8 @@ pub(super) enum Care {
     Coarse,
     /// About a known Kp only, to the last digit.
     Near(f64),
-    /// About a known Kp, to the precision of [`Care::Coarse`].
-    CoarseNear(f64),
+    /// About a known Kp, to the precision of [`Care::Coarse`]; the second is the relative half width of its first bracket.
+    CoarseNear(f64, f64),
 }
 
 /// Gains with what they are worth; smaller is better.
@@ -149,7 +149,7 @@ impl GainSearch {
     pub fn run(&mut self, on: &Ground<'_, '_>, lead: Lead, care: Care) -> Found {
         let mut task = Task::new(on, lead);
         self.allowed.limit(on.points, &on.limits);
-        if !matches!(care, Care::Near(_) | Care::CoarseNear(_)) {
+        if !matches!(care, Care::Near(_) | Care::CoarseNear(..)) {
             let family = on.family;
             task.stabilising = family.stabilising(&task.shaped);
             task.integral_alone &= task.stabilising.first().is_some_and(|i| i.0 == 0.0);
@@ -175,11 +175,12 @@ impl GainSearch {
     fn search(&mut self, task: &Task<'_, '_>, care: Care) -> Found {
         let cap = task.family.largest_kp(task.shaped.lead, &task.limits);
         // A look at everything only has to find the right valley; its bottom is sought once more when all points are in.
-        let precise = matches!(care, Care::Near(_));
-        let width = if precise { FINE } else { COARSE };
-        if let Care::Near(kp) | Care::CoarseNear(kp) = care {
-            let reach = if precise { NEARBY } else { 4.0 * NEARBY };
-            return self.nearby(task, kp.min(cap), reach * kp, cap, width);
+        match care {
+            Care::Near(kp) => return self.nearby(task, kp.min(cap), NEARBY * kp, cap, FINE),
+            Care::CoarseNear(kp, reach) => {
+                return self.nearby(task, kp.min(cap), reach * kp, cap, COARSE);
+            }
+            Care::Full | Care::Dense(_) | Care::Coarse => {}
         }
         let mut best = Found::Nothing;
         for &(low, high) in &task.stabilising {
@@ -194,7 +195,7 @@ impl GainSearch {
                 grid.extend((1..=STEPS_BELOW).map(|k| low + (first - low) * BELOW.powi(k)));
                 grid.sort_unstable_by(f64::total_cmp);
             }
-            match (self.over(task, &grid, width, endless), best) {
+            match (self.over(task, &grid, endless), best) {
                 (Found::Best(new), Found::Best(old)) if new.value >= old.value => {}
                 (Found::Nothing | Found::NotStabilising, _) => {}
                 (Found::Unbounded, _) => return Found::Unbounded,
@@ -240,7 +241,7 @@ impl GainSearch {
     }
 
     /// Looks at every gain of a grid, then about the best of them.
-    fn over(&mut self, task: &Task<'_, '_>, grid: &[f64], width: f64, endless: bool) -> Found {
+    fn over(&mut self, task: &Task<'_, '_>, grid: &[f64], endless: bool) -> Found {
         let mut seen: Vec<AtGain> = grid.iter().map(|&kp| self.at(task, kp)).collect();
         if seen.iter().any(|s| s.value == f64::NEG_INFINITY) {
             return Found::Unbounded;
@@ -270,7 +271,7 @@ impl GainSearch {
             if !task.is_stable(middle) {
                 continue;
             }
-            let mut found = valley(&mut |kp| self.at(task, kp), left, *middle, right, width);
+            let mut found = valley(&mut |kp| self.at(task, kp), left, *middle, right, COARSE);
             if !task.is_stable(&found) {
                 found = *middle;
             }

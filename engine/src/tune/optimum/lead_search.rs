@@ -22,17 +22,37 @@ const MISJUDGED: f64 = 0.5;
 const RATIOS: [f64; 3] = [1.5, 6.0, 25.0];
 const RATIOS_HELD: [f64; 4] = [1.0, 1.5, 6.0, 25.0];
 pub(super) const RATIO_RANGE: (f64, f64) = (1.0, 100.0);
+/// Least and largest relative half width of the first bracket about a Kp known from next to it.
+const REACH: (f64, f64) = (2e-3, 0.12);
 /// How far a refinement may go from where it starts, as a logarithm of Td.
 const FARTHEST: f64 = 1.5;
-/// First step of a refinement, as a logarithm: after the first look, and after points have been added.
-pub(super) const STEP: f64 = 0.2;
-pub(super) const STEP_NEARBY: f64 = 0.01;
-/// Relative widths at which it ends, likewise.
-const LAST: f64 = 1e-3;
-const LAST_NEARBY: f64 = 3e-6;
+/// First steps of a refinement, as a logarithm, and relative widths at which it ends: after the first look, and after
+/// points have been added; then no finer than a share of what the gains passed a limit by, since they move by as much again.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps {
+    first: f64,
+    last: f64,
+}
+
+impl Steps {
+    const SHARE: f64 = 0.02;
+    pub const AFTER_LOOK: Self = Self { first: 0.2, last: 1e-3 };
+    pub const NEARBY: Self = Self { first: 0.01, last: 3e-6 };
+
+    /// Of a round after one that passed a limit by a relative excess.
+    pub fn after(excess: f64) -> Self {
+        let last = (Self::SHARE * excess).clamp(Self::NEARBY.last, Self::AFTER_LOOK.last);
+        Self { last, ..Self::NEARBY }
+    }
+
+    /// Those of the n-th trial.
+    pub fn halved(self, times: i32) -> Self {
+        Self { first: self.first * 0.5f64.powi(times), ..self }
+    }
+}
 /// The same in two dimensions, where every step costs more, and the number of steps.
 const LAST_OF_TWO: f64 = 1e-4;
-const MOST_OF_TWO: usize = 60;
+const MOST_OF_TWO: usize = 90;
 
 /// The best of a grid of Td, and of N where it is free; where Ju is limited the best of each valley, the lowest first.
 ///
@@ -88,9 +108,9 @@ pub(super) fn refine(
     on: &Ground<'_, '_>,
     filter: DerivativeFilter,
     known: Candidate,
-    step: f64,
+    steps: Steps,
 ) -> Found {
-    let (mut kp, mut td_before) = (known.kp, known.lead.td_s);
+    let (mut kp, mut before) = (known.kp, known.lead);
     let start = known.lead.td_s.ln();
     let mut at = |x: f64, n: f64| -> AtLead {
         if (x - start).abs() > FARTHEST {
@@ -98,41 +118,72 @@ pub(super) fn refine(
         }
         let td_s = x.exp();
         let lead = Lead { td_s, tf_s: td_s / n };
-        let mut found = search.run(on, lead, Care::CoarseNear(kp));
+        // Kp moves by about as much as they do.
+        let moved = (td_s / before.td_s).ln().abs() + (lead.tf_s / before.tf_s).ln().abs();
+        let reach = moved.clamp(REACH.0, REACH.1);
+        let mut found = search.run(on, lead, Care::CoarseNear(kp, reach));
         if found == Found::Nothing {
             // Where the derivative is the controller's main part it is Kp Td that stays.
-            found = search.run(on, lead, Care::CoarseNear(kp * td_before / td_s));
+            found = search.run(on, lead, Care::CoarseNear(kp * before.td_s / td_s, REACH.1));
         }
         match found {
             Found::Best(found) => {
-                td_before = td_s;
-                kp = found.kp;
+                (kp, before) = (found.kp, lead);
                 AtLead { x, found: Some(found) }
             }
             _ => AtLead { x, found: None },
         }
     };
-    let precise = step <= STEP_NEARBY;
-    let last = if precise { LAST_NEARBY } else { LAST };
-    let best = match filter {
-        DerivativeFilter::Ratio(n) => along(&mut |x| at(x, n), start, step, last),
-        DerivativeFilter::Free => {
-            let mut best: Option<Candidate> = None;
-            let start = [start, (known.lead.td_s / known.lead.tf_s).ln()];
-            let mut value = |x: &[f64]| {
-                let here = at(x[0], x[1].exp().clamp(RATIO_RANGE.0, RATIO_RANGE.1));
-                if here.value() < best.map_or(f64::INFINITY, |b| b.value) {
-                    best = here.found;
+    let Steps { first: step, last } = steps;
+    let ratio = known.lead.td_s / known.lead.tf_s;
+    let best = match (filter, at_end(ratio)) {
+        (DerivativeFilter::Ratio(n), _) => along(&mut |x| at(x, n), start, step, last),
+        // There N stays, unless a little less far out is better.
+        (DerivativeFilter::Free, Some((end, inside))) => {
+            let best = along(&mut |x| at(x, end), start, step, last);
+            let td = |best: Candidate| best.lead.td_s.ln();
+            let beside = best.and_then(|best| at(td(best), inside).found);
+            match (best, beside) {
+                (Some(best), Some(beside)) if beside.value < best.value => {
+                    over_both(&mut at, [td(beside), inside.ln()], steps)
                 }
-                here.value()
-            };
-            let last_step = last.max(LAST_OF_TWO);
-            let simplex = Simplex { step, last_step, most_evaluations: MOST_OF_TWO };
-            minimise(&simplex, &start, &mut value);
-            best
+                _ => best,
+            }
         }
+        (DerivativeFilter::Free, None) => over_both(&mut at, [start, ratio.ln()], steps),
     };
     best.map_or(Found::Nothing, Found::Best)
+}
+
+/// The end of the range of N that it stands at, with a place a little inside.
+fn at_end(n: f64) -> Option<(f64, f64)> {
+    const NEAR: f64 = 1.02;
+    const INSIDE: f64 = 1.07;
+    let (low, high) = RATIO_RANGE;
+    if n <= low * NEAR {
+        Some((low, low * INSIDE))
+    } else {
+        (n >= high / NEAR).then_some((high, high / INSIDE))
+    }
+}
+
+/// Downhill over ln Td and ln N.
+fn over_both(
+    at: &mut dyn FnMut(f64, f64) -> AtLead,
+    start: [f64; 2],
+    Steps { first: step, last }: Steps,
+) -> Option<Candidate> {
+    let mut best: Option<Candidate> = None;
+    let mut value = |x: &[f64]| {
+        let here = at(x[0], x[1].exp().clamp(RATIO_RANGE.0, RATIO_RANGE.1));
+        if here.value() < best.map_or(f64::INFINITY, |b| b.value) {
+            best = here.found;
+        }
+        here.value()
+    };
+    let simplex = Simplex { step, last_step: last.max(LAST_OF_TWO), most_evaluations: MOST_OF_TWO };
+    minimise(&simplex, &start, &mut value);
+    best
 }
 
 /// Walks downhill along ln Td until it stands in a valley, and to its bottom.

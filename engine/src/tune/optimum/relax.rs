@@ -2,6 +2,7 @@
 
 use super::certificate::{Check, Limit};
 use super::gain_search::{Candidate, Found};
+use super::lead_search::Steps;
 use super::problem::{LoopLimits, Objective};
 use super::solve::{LARGEST_MS, Quest, Solver};
 
@@ -87,7 +88,7 @@ impl Solver<'_> {
         let mut least = None;
         for _ in 0..ROUNDS {
             let found = match known {
-                Some(known) => self.look_nearby(&quest, known),
+                Some(known) => self.look_nearby(&quest, known, Steps::NEARBY),
                 None => self.look_everywhere(&quest),
             };
             let Found::Best(candidate) = found else { break };

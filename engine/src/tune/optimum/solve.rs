@@ -6,7 +6,7 @@ use super::error::OptimumError;
 use super::family::Family;
 use super::floor;
 use super::gain_search::{Candidate, Care, Found, GainSearch, Ground};
-use super::lead_search::{self, RATIO_RANGE};
+use super::lead_search::{self, RATIO_RANGE, Steps};
 use super::points::{Plant, Points};
 use super::problem::{DerivativeFilter, LoopLimits, Objective, OptimumProblem, Process, Wanted};
 use super::relax::Relax;
@@ -19,6 +19,8 @@ const LAST_STEPS: usize = 14;
 /// Relative excess up to which gains all but meet the limits, and how much better they must be to be gone back to.
 const ALL_BUT: f64 = 0.02;
 const DEEPER: f64 = 0.01;
+/// Relative loss of Jv for each of that excess.
+const COST: f64 = 4.0;
 /// Relative loss from one round to the next after which gains are sought afresh.
 const LOST: f64 = 0.02;
 /// First and last step, as a logarithm, of the walk over Td and N with the search at rest at each.
@@ -217,7 +219,7 @@ impl<'a> Solver<'a> {
         }
         let pid = match looked {
             Ok(valleys) => {
-                let mut refine = |known| self.refined(quest, filter, known, lead_search::STEP);
+                let mut refine = |known| self.refined(quest, filter, known, Steps::AFTER_LOOK);
                 let bottoms: Vec<Found> = valleys.into_iter().map(&mut refine).collect();
                 let candidate = |found: &Found| if let Found::Best(c) = found { Some(*c) } else { None };
                 self.valleys = bottoms.iter().filter_map(candidate).collect();
@@ -233,7 +235,7 @@ impl<'a> Solver<'a> {
     }
 
     /// About known gains, on the points that bear on them and on those that turn out to.
-    fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, step: f64) -> Found {
+    fn refined(&mut self, quest: &Quest, filter: DerivativeFilter, known: Candidate, steps: Steps) -> Found {
         let all = &self.family.points;
         let held = quest.limits.ju.is_finite() && quest.relax.is_none();
         let mut points = all.near(&quest.limits_at(&known), known.lead, known.kp, known.ki);
@@ -244,9 +246,10 @@ impl<'a> Solver<'a> {
         let mut best: Option<Candidate> = None;
         for trial in 0..TRIALS {
             let on = Ground { points: &points, ..whole };
-            let step = step * 0.5f64.powi(trial);
             let start = best.unwrap_or(known);
-            let Found::Best(found) = lead_search::refine(&mut self.search, &on, filter, start, step) else {
+            let Found::Best(found) =
+                lead_search::refine(&mut self.search, &on, filter, start, steps.halved(trial))
+            else {
                 break;
             };
             // What the other points make of it.
@@ -274,11 +277,9 @@ impl<'a> Solver<'a> {
     }
 
     /// About known gains, to the last digit.
-    pub fn look_nearby(&mut self, quest: &Quest, known: Candidate) -> Found {
+    pub fn look_nearby(&mut self, quest: &Quest, known: Candidate, steps: Steps) -> Found {
         match self.wanted {
-            Wanted::Pid(filter) if known.lead.td_s > 0.0 => {
-                self.refined(quest, filter, known, lead_search::STEP_NEARBY)
-            }
+            Wanted::Pid(filter) if known.lead.td_s > 0.0 => self.refined(quest, filter, known, steps),
             _ => {
                 let limits = quest.limits_at(&known);
                 let points = self.family.points.near(&limits, known.lead, known.kp, known.ki);
@@ -346,7 +347,8 @@ impl<'a> Solver<'a> {
         let mut promising: Option<Candidate> = None;
         let mut sought_least = false;
         for round in 1..=ROUNDS {
-            let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(&quest, k));
+            let steps = Steps::after(excess);
+            let mut found = known.map_or(Found::Nothing, |k| self.look_nearby(&quest, k, steps));
             if found == Found::Nothing {
                 found = self.look_everywhere(&quest);
             }
@@ -378,7 +380,8 @@ impl<'a> Solver<'a> {
                 continue;
             }
             last = Some(candidate);
-            let held = Candidate { value: check.peaks.v.value, ..candidate };
+            // What meeting the limits may cost is no depth.
+            let held = Candidate { value: check.peaks.v.value * (1.0 + COST * check.excess), ..candidate };
             let all_but = check.excess < ALL_BUT && objective == Objective::Jv;
             if all_but && promising.is_none_or(|p| held.value < p.value) {
                 promising = Some(held);
@@ -386,7 +389,7 @@ impl<'a> Solver<'a> {
             // The first look is a coarse one.
             if known.is_none() {
                 self.add(&check);
-                known = Some(candidate);
+                (known, excess) = (Some(candidate), check.excess);
                 continue;
             }
             excess = check.excess;
