@@ -86,7 +86,9 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
         Some((rss, [vec![point], others.clone()].concat()))
     };
     let (plain, plain_points) = cost(whole)?;
-    if fit_percent(&clipped(&of_mv, whole, factor), plain) > GOOD_PERCENT {
+    if fit_percent(&clipped(&of_mv, whole, factor), plain) > GOOD_PERCENT
+        || is_mostly_noise(&stretch, &shape, &plain_points)
+    {
         return None;
     }
     let mut valleys = vec![(plain, whole, plain_points.clone())];
@@ -136,6 +138,27 @@ fn look_closely(problem: &FitProblem) -> Option<Seen> {
         let others = found[1..].iter().map(|f| (f.limits, f.rss / best.rss)).collect();
         Seen::Limits(Limits { best: best.limits, others })
     })
+}
+
+/// Whether so much of a fit's residual is white noise that neither limits nor a valve can explain [`FALL`] of it: second
+/// differences of noise have six times its variance, while what they leave over passes a lag of many rows.
+fn is_mostly_noise(stretch: &Stretch, shape: &Shape, points: &[Point]) -> bool {
+    const MOST: f64 = 0.6;
+    const ROWS_OF_LAG: f64 = 10.0;
+    if points[0].time_s < ROWS_OF_LAG * stretch.sample_time_s {
+        return false;
+    }
+    let found = evaluate(stretch, shape, points.to_vec(), &Linear::zero(shape, stretch));
+    let Some(found) = found else { return false };
+    let (_, residuals) = free_run(stretch, shape, &found);
+    let (mut noise, mut all) = (0.0, 0.0);
+    for row in
+        (1..residuals.len().saturating_sub(1)).filter(|row| (row - 1..=row + 1).all(|k| stretch.is_kept(k)))
+    {
+        noise += (residuals[row - 1] - 2.0 * residuals[row] + residuals[row + 1]).powi(2) / 6.0;
+        all += residuals[row].powi(2);
+    }
+    noise > MOST * all
 }
 
 /// The gain beyond limits in percent of that between them, where it is not next to nothing as behind a real limit.
