@@ -263,6 +263,24 @@ fn values_called_bad_beside_them_are_missing() {
     }
 }
 
+/// Heat in watts and states of a plant say nothing of the values beside them.
+#[test]
+fn what_is_no_quality_spoils_no_values() {
+    for (name, words) in [
+        ("Q", ["192", "20"]),
+        ("Plant", ["Normal", "No flow"]),
+        ("Pump", ["OK", "Bad"]),
+        ("Valve", ["TRUE", "FALSE"]),
+        ("Alarm", ["NO", "YES"]),
+    ] {
+        let log = import(&rows(&format!("t,PV,{name},MV"), 80, |k| {
+            format!("{k},{:.4},{},{:.4}", pv(k), words[usize::from(k % 20 > 12)], mv(k))
+        }));
+        let whole = |name: &str| column(&log, name).iter().all(|v| v.is_finite());
+        assert!(whole("PV") && whole("MV"), "{name}: {:?}", log.report.repairs);
+    }
+}
+
 /// As a text editor of Unix or an export for statistics writes it.
 #[test]
 fn utf32_with_a_mark() {

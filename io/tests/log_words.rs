@@ -3,6 +3,9 @@
 use vasos_engine::signal::LogStart;
 use vasos_io::log::{ImportOptions, ImportedLog, Repair, TimeKind, import_log, open_logs};
 
+/// The time of a row.
+type Stamp = fn(usize) -> String;
+
 fn import(text: &str) -> ImportedLog {
     import_log("test", text.as_bytes(), &ImportOptions::default()).expect("a log")
 }
@@ -109,7 +112,7 @@ fn names_in_other_languages() {
 
 #[test]
 fn stamps_of_other_systems() {
-    let cases: [(&str, fn(usize) -> String); 14] = [
+    let cases: [(&str, Stamp); 14] = [
         ("Windows in Spanish", |k| format!("28/06/2024 02:35:{k:02} p. m.")),
         ("the same with hard blanks", |k| format!("28/06/2024 2:35:{k:02}\u{a0}p.\u{a0}m.")),
         ("the same, narrow", |k| format!("28/06/2024, 2:35:{k:02}\u{202f}p.\u{a0}m.")),
@@ -186,7 +189,7 @@ fn syslog_stamps_have_no_year() {
 
 #[test]
 fn a_column_for_each_part_of_the_time() {
-    let cases: [(&str, fn(usize) -> String); 9] = [
+    let cases: [(&str, Stamp); 9] = [
         ("Year,Month,Day,Hour,Minute,Second", |k| format!("2024,6,28,14,35,{k}")),
         ("YYYY,MM,DD,hh,mm,ss,ms", |k| format!("2024,06,28,14,35,{k:02},000")),
         ("Day,Month,Year,Hour,Min,Sec", |k| format!("28,6,2024,14,35,{k}")),
@@ -236,6 +239,19 @@ fn days_that_are_numbers() {
     starts(&log, "2022-01-01T00:00:00");
 }
 
+/// Columns with the names of parts that measure something.
+#[test]
+fn what_is_no_part_of_the_time_stays() {
+    let log = import(&rows("Time,ms", 60, |k| format!("2024-06-28 14:35:{k:02},{}", 20 + k * 7 % 31)));
+    assert_eq!(names(&log), ["ms"]);
+    let log =
+        import(&rows("Time,Min,Max", 60, |k| format!("2024-06-28 14:35:{k:02},{},{}", k % 7, 50 + k % 9)));
+    assert_eq!(names(&log), ["Min", "Max"]);
+    let log = import(&rows("t,PV", 200, |k| format!("{:.3},{:.4}", 2000.001 + 1e-3 * k as f64, pv(k))));
+    steps(&log, 200, 1e-3);
+    assert_eq!(log.table.start, LogStart::Seconds(2000.001));
+}
+
 #[test]
 fn units_of_several_at_once() {
     for (name, unit_s) in [
@@ -245,6 +261,7 @@ fn units_of_several_at_once() {
         ("Time (10 ms)", 0.01),
         ("Zeit [x 100 ms]", 0.1),
         ("time [5min]", 300.0),
+        ("Time (24h)", 3600.0),
         ("Time [100 µs]", 1e-4),
     ] {
         let log = import(&rows(&format!("{name};PV;MV"), 60, |k| format!("{k};{:.4};{:.4}", pv(k), mv(k))));

@@ -351,6 +351,10 @@ fn several(unit: &str) -> Option<f64> {
     let digits = text.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | ','))?;
     let (count, word) = text.split_at(digits);
     let count: f64 = count.replace(',', ".").parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0)?;
+    // A clock of 24 hours is no unit.
+    if [12.0, 24.0].contains(&count) && word.trim() == "h" {
+        return Some(3600.0);
+    }
     let word = word.trim_matches(['x', '×', '*', '·', ' ']);
     UNITS.iter().find(|(_, words)| words.contains(&word)).map(|(unit_s, _)| count * unit_s)
 }

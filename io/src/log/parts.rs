@@ -55,9 +55,10 @@ const NAMES: [(Part, &[&str]); 9] = [
     ),
 ];
 
-/// Puts together the first columns side by side that are parts of one time.
+/// Puts together the first columns side by side that are parts of one time, where others are left to be measured.
 pub(super) fn compose(read: &mut Read) {
-    read.columns.iter_mut().for_each(day_of_year);
+    let with_clock = read.columns.iter().any(|c| c.kind == Kind::Clock);
+    read.columns.iter_mut().for_each(|column| day_of_year(column, with_clock));
     for first in 0..read.columns.len() {
         let mut found: Vec<Part> = Vec::new();
         for column in &read.columns[first..] {
@@ -68,7 +69,11 @@ pub(super) fn compose(read: &mut Read) {
         }
         while found.len() > 1 {
             let columns = &read.columns[first..first + found.len()];
-            if let Some(kind) = kind_of(&found)
+            let measures = |(i, c): (usize, &ReadColumn)| {
+                c.kind == Kind::Number && !(first..first + found.len()).contains(&i)
+            };
+            if read.columns.iter().enumerate().any(measures)
+                && let Some(kind) = kind_of(&found)
                 && let Some(values) = times(columns, &found)
             {
                 let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
@@ -180,11 +185,12 @@ fn all(values: &[f64], fits: impl Fn(f64) -> bool) -> bool {
     values.iter().filter(|v| v.is_finite()).all(|&v| fits(v))
 }
 
-/// Numbers such as 2024.180 under the name of a date become dates: the day of the year stands behind the point.
-fn day_of_year(column: &mut ReadColumn) {
+/// Numbers such as 2024.180 under the name of a date, or beside times of day under that of a time, become dates: the day
+/// of the year stands behind the point.
+fn day_of_year(column: &mut ReadColumn, with_clock: bool) {
     let lower = column.name.to_lowercase();
-    let named =
-        super::axis::is_time_name(&lower) || ["ddd", "doy", "julian"].iter().any(|w| lower.contains(w));
+    let is_date = ["ddd", "doy", "julian", "date"].iter().any(|w| lower.contains(w));
+    let named = is_date || with_clock && super::axis::is_time_name(&lower);
     if column.kind != Kind::Number || !named || !column.values.iter().any(|v| v.is_finite()) {
         return;
     }

@@ -87,7 +87,7 @@ const QUALITY_NAMES: [&str; 16] = [
 /// A signal needs this many values on average for names to be those of signals.
 const FEWEST_VALUES: usize = 2;
 /// OPC: a quality from here on is good; a historian's confidence in percent: from here on.
-const OPC_GOOD: f64 = 192.0;
+pub(super) const OPC_GOOD: f64 = 192.0;
 const CONFIDENT: f64 = 50.0;
 
 /// The columns of such a layout.
@@ -335,7 +335,8 @@ pub(super) fn good_rows(column: &ReadColumn) -> Vec<bool> {
 /// Whether a word calls a value bad.
 pub(super) fn is_bad(word: &str) -> bool {
     let word = word.to_lowercase();
-    ["bad", "false", "invalid", "no", "ruim", "schlecht", "ungültig", "comm"]
+    let none = word == "no" || word.starts_with("no ") || word.starts_with("not ");
+    none || ["bad", "false", "invalid", "ruim", "schlecht", "ungültig", "comm"]
         .iter()
         .any(|b| word.starts_with(b))
 }

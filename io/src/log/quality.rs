@@ -1,12 +1,12 @@
 //! Columns that say of each value beside them whether it is good: `TIC101.PV, Quality`.
 
 use super::Repair;
-use super::pivot::{good_rows, is_bad, is_quality_name, normal};
+use super::pivot::{OPC_GOOD, good_rows, is_bad, is_quality_name, normal};
 use super::read::{Kind, Read, ReadColumn};
 
-/// Words that a quality begins with, beside those that [`is_bad`] knows.
-const OTHERS: [&str; 9] =
-    ["good", "ok", "valid", "true", "uncertain", "questionable", "substituted", "bom", "gut"];
+/// Words that only a quality begins with, and others that are known beside bad ones.
+const CERTAIN: [&str; 3] = ["good", "valid", "gut"];
+const OTHERS: [&str; 6] = ["ok", "true", "uncertain", "questionable", "substituted", "yes"];
 /// Endings of names behind that of their value: `TIC101.PV Status`.
 const ENDINGS: [&str; 4] = ["status", "stat", "qual", "st"];
 
@@ -32,19 +32,30 @@ pub(super) fn take_out(read: &mut Read, repairs: &mut Vec<Repair>) {
 
 /// Words of a quality alone and one that is bad among them, or numbers under the name of one, as OPC counts.
 fn is_quality(column: &ReadColumn) -> bool {
+    let last = last_word(&column.name);
     match column.kind {
         Kind::Words => {
-            let other = |word: &str| OTHERS.iter().any(|o| word.to_lowercase().starts_with(o));
-            let is_flag = |word: &str| ["true", "false", "no"].contains(&word.to_lowercase().as_str());
-            let bad = column.states.iter().filter(|s| is_bad(s)).count();
-            let flags = column.states.iter().any(|s| is_flag(s));
-            bad > 0
-                && column.states.iter().all(|s| is_bad(s) || other(s))
-                && (!flags || is_quality_name(last_word(&column.name)))
+            let begins =
+                |words: &[&str], state: &str| words.iter().any(|w| state.to_lowercase().starts_with(w));
+            let bad = column.states.iter().any(|s| is_bad(s));
+            let good = column.states.iter().any(|s| begins(&CERTAIN, s));
+            let named = is_quality_name(last) || good || ENDINGS.contains(&normal(last).as_str());
+            bad && named
+                && column.states.iter().all(|s| is_bad(s) || begins(&CERTAIN, s) || begins(&OTHERS, s))
         }
-        Kind::Number => is_quality_name(last_word(&column.name)) && column.values.iter().any(|v| *v >= 192.0),
+        // A lone Q is heat or a flow.
+        Kind::Number => {
+            is_quality_name(last) && (last.len() > 1 || last.len() < column.name.len()) && is_opc(column)
+        }
         _ => false,
     }
+}
+
+/// Whether numbers are qualities of OPC: eight bits, and mostly good.
+fn is_opc(column: &ReadColumn) -> bool {
+    let known = || column.values.iter().filter(|v| v.is_finite());
+    let good = known().filter(|v| **v >= OPC_GOOD).count();
+    2 * good > known().count() && known().all(|v| v.fract() == 0.0 && (0.0..256.0).contains(v))
 }
 
 fn last_word(name: &str) -> &str {

@@ -150,9 +150,7 @@ fn is_mode(state: &str) -> bool {
     words(state).iter().any(|word| {
         let begins = |mode: &&str| (mode.chars().count() > 3 || !mode.is_ascii()) && word.starts_with(*mode);
         let long = ["cascade", "cascata", "local", "lokal", "remote", "remoto"];
-        MODES.contains(&word.as_str())
-            || MODES.iter().any(|mode| begins(&mode))
-            || long.contains(&word.as_str())
+        MODES.contains(&word.as_str()) || MODES.iter().any(begins) || long.contains(&word.as_str())
     })
 }
 
