@@ -186,6 +186,23 @@ fn a_block_of_zeros_takes_no_rows_with_it() {
         assert_eq!(column(&log, "LIC101.PV")[119], (pv(119) * 1e3).round() / 1e3);
         assert_eq!(column(&log, "LIC101.PV")[120], (pv(140) * 1e3).round() / 1e3);
     }
+    // At the end of the file, a row cut off ahead of them and one behind.
+    for behind in ["", "2024-03-05 14:20:00;51.2"] {
+        let mut bytes = b"Time;LIC101.PV;LIC101.OP;LIC101.MODE\r\n".to_vec();
+        (0..60).for_each(|k| bytes.extend(row(k).bytes()));
+        bytes.extend(b"2024-03-05 14:05:00;5");
+        bytes.extend([0; 512]);
+        bytes.extend(behind.bytes());
+        let log = import_bytes(&bytes);
+        let cut = log.report.repairs.iter().filter(|r| matches!(r, Repair::TornRow { line: 62 })).count();
+        assert_eq!(
+            (log.table.len(), cut),
+            (60, 1 + usize::from(!behind.is_empty())),
+            "{:?}",
+            log.report.repairs
+        );
+        says(&log, &Repair::Zeros { bytes: 512, line: 62 });
+    }
     // In a file longer than the stretch by which it is judged, and more zeros than a line may have letters.
     let mut bytes = b"t,PV,MV\n".to_vec();
     let row = |k: usize| format!("{k}.0,{:.3},{:.3}\n", pv(k), mv(k));

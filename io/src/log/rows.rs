@@ -257,7 +257,12 @@ impl<'a> Reader<'a> {
             }
             at += run.len();
         }
-        self.text(line.number, &text[piece..]);
+        let behind = &text[piece..];
+        if line.open && !is_blank(behind) && self.is_cut(behind, line) {
+            self.torn.push(line.number);
+        } else {
+            self.text(line.number, behind);
+        }
     }
 
     /// Whether the rows before a text say that it is none of theirs, but the beginning of one.
