@@ -254,6 +254,7 @@ fn time_words(log: &ImportedLog) -> String {
         TimeKind::Stamps => "stamps".to_owned(),
         TimeKind::ExcelSerials => "days as a spreadsheet counts".to_owned(),
         TimeKind::MatlabDays => "days as MATLAB counts".to_owned(),
+        TimeKind::JulianDays => "Julian days".to_owned(),
         TimeKind::Epoch => "seconds since 1970".to_owned(),
         TimeKind::Missing { sample_time_s, assumed } => {
             let given = if assumed { "assumed; give it with --sample-time" } else { "given" };

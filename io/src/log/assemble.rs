@@ -4,7 +4,10 @@ use vasos_engine::signal::{LogColumn, LogTable};
 
 use super::arrange::arrange;
 use super::read::{Kind, Read, ReadColumn};
-use super::{FileFormat, ImportError, ImportOptions, ImportReport, ImportedLog, Repair, axis, notes, roles};
+use super::{
+    DateOrder, FileFormat, ImportError, ImportOptions, ImportReport, ImportedLog, Repair, axis, notes, parts,
+    quality, roles, stand_ins,
+};
 
 /// Of a column with blanks in it, this share and more of them means that only changes were written.
 const SPARSE: f64 = 0.5;
@@ -17,6 +20,8 @@ pub(super) struct Source {
     pub format: FileFormat,
     pub header_line: Option<usize>,
     pub first_data_line: usize,
+    /// Order of day and month that its dates show for certain.
+    pub date_order: Option<DateOrder>,
 }
 
 /// Makes the log.
@@ -26,19 +31,23 @@ pub(super) struct Source {
 /// [`ImportError::FewNumbers`], [`ImportError::NoSuchTimeColumn`].
 pub(super) fn assemble(
     name: &str,
-    read: Read,
+    mut read: Read,
     source: Source,
     options: &ImportOptions,
     mut repairs: Vec<Repair>,
 ) -> Result<ImportedLog, ImportError> {
+    if options.time_column.is_none() {
+        parts::compose(&mut read);
+    }
     let mut read = arrange(read, options, &mut repairs);
+    quality::take_out(&mut read, &mut repairs);
     let axis = axis::find(&mut read, options, &mut repairs)?;
     if axis.time_s.len() < 2 {
         return Err(ImportError::OneRow { line: source.first_data_line });
     }
     let time_column = axis.columns.first().map(|&i| read.columns[i].name.clone());
     let mut columns = Vec::new();
-    for (i, column) in std::mem::take(&mut read.columns).into_iter().enumerate() {
+    for (i, mut column) in std::mem::take(&mut read.columns).into_iter().enumerate() {
         if axis.columns.contains(&i) {
             continue;
         }
@@ -47,6 +56,7 @@ pub(super) fn assemble(
         } else if column.kind.is_stamp() {
             repairs.push(Repair::SpareTime { column: column.name });
         } else {
+            stand_ins::take_out(&mut column, &read.lines, &mut repairs);
             columns.push(log_column(column, axis.keep.as_deref(), &axis.time_s, &mut repairs));
         }
     }

@@ -5,7 +5,7 @@ use vasos_engine::signal::LogStart;
 use super::calendar::{days_from_civil, iso};
 use super::order::{ordered, typical_step};
 use super::read::{Kind, Read};
-use super::stamp::DAY_S;
+use super::stamp::{DAY_S, NO_YEAR_S};
 use super::{ImportError, ImportOptions, Repair, TimeKind};
 
 /// 1970-01-01 as a spreadsheet counts days, and as MATLAB does.
@@ -13,6 +13,13 @@ const EXCEL_1970: f64 = 25_569.0;
 const MATLAB_1970: f64 = 719_529.0;
 /// 1970-01-01 as LabVIEW counts seconds.
 const LABVIEW_1970_S: f64 = 2_082_844_800.0;
+/// 1970-01-01 in Julian days, and in modified ones.
+const JULIAN_1970: f64 = 2_440_587.5;
+const MODIFIED_JULIAN_1970: f64 = 40_587.0;
+/// 1970-01-01 in 100 ns since 1601, as Windows counts, and since the year 1, as .NET does.
+const FILETIME_1970: f64 = 116_444_736_000_000_000.0;
+const NET_TICKS_1970: f64 = 621_355_968_000_000_000.0;
+const TICK_S: f64 = 1e-7;
 /// A nameless column needs this many rows to pass for a clock.
 const FEWEST_TICKS: usize = 8;
 
@@ -63,11 +70,17 @@ pub(super) fn find(
     let Some(&first) = columns.first() else { return Ok(counted(read, options, repairs)) };
     let is_clock = read.columns[first].kind == Kind::Clock;
     let zone_s = read.columns[first].zone_s;
-    let (kind, raw) = seconds(read, &columns);
+    let (kind, mut raw) = seconds(read, &columns);
+    let no_year = !is_clock && kind == TimeKind::Stamps && go_on_over_the_year(&mut raw);
+    if no_year {
+        repairs.push(Repair::NoYear);
+    }
     let calendar = !is_clock && !matches!(kind, TimeKind::Numbers { .. });
     let (keep, mut time_s) = ordered(raw, read, calendar, zone_s.is_some(), repairs);
     let start_s = time_s.first().copied().unwrap_or(0.0);
-    let start = if calendar {
+    let start = if no_year {
+        LogStart::Seconds(start_s - NO_YEAR_S[0])
+    } else if calendar {
         LogStart::Calendar(iso(start_s + zone_s.unwrap_or(0.0)))
     } else {
         LogStart::Seconds(start_s)
@@ -165,7 +178,10 @@ fn stands_still(values: &[f64]) -> bool {
 
 /// Whether a name is one of a time.
 pub(super) fn is_time_name(name: &str) -> bool {
-    const NAMES: [&str; 23] = [
+    const NAMES: [&str; 26] = [
+        "jd",
+        "mjd",
+        "julian",
         "millis",
         "time",
         "t",
@@ -258,7 +274,8 @@ fn seconds(read: &mut Read, columns: &[usize]) -> (TimeKind, Vec<f64>) {
                 return (TimeKind::Stamps, raw);
             }
             let stated_s = read.stated_sample_time_s;
-            let (kind, unit_s, origin) = numeric_kind(&raw, &unit_of(read, columns[0]), stated_s);
+            let several_s = read.columns[columns[0]].unit.as_deref().and_then(several);
+            let (kind, unit_s, origin) = numeric_kind(&raw, &unit_of(read, columns[0]), stated_s, several_s);
             raw.iter_mut().for_each(|t| *t = (*t - origin) * unit_s);
             (kind, raw)
         }
@@ -289,25 +306,86 @@ fn unwrap_midnights(raw: &mut [f64]) {
     }
 }
 
+/// Whether stamps have no year; then they go on over its turn, and February has 29 days only where it shows one.
+fn go_on_over_the_year(raw: &mut [f64]) -> bool {
+    const MARCH_S: f64 = NO_YEAR_S[0] + 60.0 * DAY_S;
+    let in_it = |t: &f64| (NO_YEAR_S[0]..NO_YEAR_S[1]).contains(t);
+    let mut finite = raw.iter().filter(|t| t.is_finite()).peekable();
+    if finite.peek().is_none() || !finite.all(in_it) {
+        return false;
+    }
+    let leap = raw.iter().any(|t| (MARCH_S - DAY_S..MARCH_S).contains(t));
+    let (less_s, year_s) = if leap { (0.0, 366.0 * DAY_S) } else { (DAY_S, 365.0 * DAY_S) };
+    let (mut years_s, mut last_s) = (0.0, f64::NAN);
+    for t in raw.iter_mut() {
+        let here_s = if *t >= MARCH_S { *t - less_s } else { *t };
+        if here_s - last_s < -0.5 * year_s {
+            years_s += year_s;
+        }
+        last_s = here_s;
+        *t = here_s + years_s;
+    }
+    true
+}
+
 /// Name and unit of a column: either may say what it counts.
 fn unit_of(read: &Read, column: usize) -> String {
     format!("{} {}", read.columns[column].name, read.columns[column].unit.as_deref().unwrap_or(""))
 }
 
-/// Kind, seconds of a unit, and what to take off first.
-fn numeric_kind(raw: &[f64], name: &str, stated_s: Option<f64>) -> (TimeKind, f64, f64) {
+/// Words of units of time in lower case, and their seconds.
+const UNITS: [(f64, &[&str]); 7] = [
+    (1e-9, &["ns", "nanoseconds"]),
+    (1e-6, &["us", "µs", "μs", "usec", "micros", "microseconds"]),
+    (1e-3, &["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "milissegundos"]),
+    (60.0, &["min", "mins", "minute", "minutes", "minuten", "minuto", "minutos"]),
+    (3600.0, &["h", "hr", "hrs", "hour", "hours", "stunden", "heures", "hora", "horas"]),
+    (DAY_S, &["d", "day", "days", "tage", "jours", "dia", "dias"]),
+    (1.0, &["s", "sec", "secs", "second", "seconds", "sekunden", "segundos", "secondes"]),
+];
+
+/// Seconds of a unit of several at once: `100ms`, `0.1 s`, `x 10 ms`.
+fn several(unit: &str) -> Option<f64> {
+    let lower = unit.to_lowercase();
+    let text = lower.trim_start_matches(['x', '×', '*', ' ']);
+    let digits = text.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | ','))?;
+    let (count, word) = text.split_at(digits);
+    let count: f64 = count.replace(',', ".").parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0)?;
+    // A clock of 24 hours is no unit.
+    if [12.0, 24.0].contains(&count) && word.trim() == "h" {
+        return Some(3600.0);
+    }
+    let word = word.trim_matches(['x', '×', '*', '·', ' ']);
+    UNITS.iter().find(|(_, words)| words.contains(&word)).map(|(unit_s, _)| count * unit_s)
+}
+
+/// Kind, seconds of a unit, and what to take off first; `several_s`, where the unit is so many seconds for certain.
+fn numeric_kind(
+    raw: &[f64],
+    name: &str,
+    stated_s: Option<f64>,
+    several_s: Option<f64>,
+) -> (TimeKind, f64, f64) {
     let first = raw.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     let mut sizes: Vec<f64> = steps(raw).map(f64::abs).filter(|s| *s > 0.0).take(1000).collect();
     sizes.sort_by(f64::total_cmp);
     let step = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
-    if (20_000.0..80_000.0).contains(&first) && step < 0.5 {
-        return (TimeKind::ExcelSerials, DAY_S, EXCEL_1970);
+    let lower = name.to_lowercase();
+    let has = |unit: &str| lower.split(|c: char| !c.is_alphanumeric()).any(|w| w == unit);
+    if let Some(unit_s) = several_s {
+        return (TimeKind::Numbers { unit_s }, unit_s, 0.0);
     }
-    if (700_000.0..800_000.0).contains(&first) && step < 0.5 {
-        return (TimeKind::MatlabDays, DAY_S, MATLAB_1970);
+    if let Some((kind, origin)) = days(first, step, &lower) {
+        return (kind, DAY_S, origin);
     }
     if (3.2e9..4.5e9).contains(&first) {
         return (TimeKind::Epoch, 1.0, LABVIEW_1970_S);
+    }
+    // Ticks of 100 ns, from 1990 to 2150.
+    for origin in [FILETIME_1970, NET_TICKS_1970] {
+        if (origin + 6.3e15..origin + 5.7e16).contains(&first) {
+            return (TimeKind::Epoch, TICK_S, origin);
+        }
     }
     // Seconds, milliseconds, microseconds and nanoseconds since 1970, from 2001 on.
     for (seconds_at_least, unit_s) in [(1e9, 1.0), (1e12, 1e-3), (1e15, 1e-6), (1e18, 1e-9)] {
@@ -315,17 +393,8 @@ fn numeric_kind(raw: &[f64], name: &str, stated_s: Option<f64>) -> (TimeKind, f6
             return (TimeKind::Epoch, unit_s, 0.0);
         }
     }
-    let lower = name.to_lowercase();
-    let has = |unit: &str| lower.split(|c: char| !c.is_alphanumeric()).any(|w| w == unit);
-    let units: [(f64, &[&str]); 6] = [
-        (1e-9, &["ns", "nanoseconds"]),
-        (1e-6, &["us", "µs", "μs", "usec", "micros", "microseconds"]),
-        (1e-3, &["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "milissegundos"]),
-        (60.0, &["min", "mins", "minute", "minutes", "minuten", "minuto", "minutos"]),
-        (3600.0, &["h", "hr", "hrs", "hour", "hours", "stunden", "heures", "hora", "horas"]),
-        (DAY_S, &["d", "day", "days", "tage", "jours", "dia", "dias"]),
-    ];
-    let named = units.iter().find(|(_, words)| words.iter().any(|word| has(word)));
+    // A single `s` may stand for anything; seconds are what is taken without a unit.
+    let named = UNITS[..6].iter().find(|(_, words)| words.iter().any(|word| has(word)));
     let unit_s = if let Some((unit_s, _)) = named {
         *unit_s
     } else {
@@ -334,6 +403,22 @@ fn numeric_kind(raw: &[f64], name: &str, stated_s: Option<f64>) -> (TimeKind, f6
         [1.0, 1e-3, 60.0, 3600.0].into_iter().find(is_it).unwrap_or(1.0)
     };
     (TimeKind::Numbers { unit_s }, unit_s, 0.0)
+}
+
+/// Kind and origin of numbers that count days since long ago.
+fn days(first: f64, step: f64, name: &str) -> Option<(TimeKind, f64)> {
+    let named = name.contains("julian") || name.split(|c: char| !c.is_alphanumeric()).any(|w| w == "jd");
+    if (2_400_000.0..2_500_000.0).contains(&first) && (step < 0.5 || named && step <= 1.0) {
+        return Some((TimeKind::JulianDays, JULIAN_1970));
+    }
+    if name.contains("mjd") && (40_000.0..100_000.0).contains(&first) && step <= 1.0 {
+        return Some((TimeKind::JulianDays, MODIFIED_JULIAN_1970));
+    }
+    if (20_000.0..80_000.0).contains(&first) && step < 0.5 {
+        return Some((TimeKind::ExcelSerials, EXCEL_1970));
+    }
+    let is_matlab = (700_000.0..800_000.0).contains(&first) && step < 0.5;
+    is_matlab.then_some((TimeKind::MatlabDays, MATLAB_1970))
 }
 
 fn note_gaps(time_s: &[f64], keep: Option<&[u32]>, read: &Read, repairs: &mut Vec<Repair>) {

@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 
+use super::utf32::{self, Decoder};
 use super::{Encoding, ImportError};
 
 /// A character set and how to read it.
@@ -12,16 +13,27 @@ pub(super) struct Charset {
     codec: &'static encoding_rs::Encoding,
     /// Bytes of the byte order mark.
     pub mark: usize,
+    /// Of UTF-32, whether the highest byte comes first.
+    big: bool,
 }
+
+/// So many zeros in a row are a block that a crash left, and no text.
+pub(super) const BLOCK_OF_ZEROS: usize = 16;
+/// Bytes by which text is told from other files.
+const JUDGED: usize = 65_536;
 
 impl Charset {
     fn new(found: Encoding, codec: &'static encoding_rs::Encoding, mark: usize) -> Self {
-        Self { found, codec, mark }
+        Self { found, codec, mark, big: false }
     }
 
     /// The decoder of a set in which separators and digits are not the bytes of ASCII.
-    pub fn decoder(&self) -> Option<encoding_rs::Decoder> {
-        (self.found == Encoding::Utf16).then(|| self.codec.new_decoder_without_bom_handling())
+    pub fn decoder(&self) -> Option<Decoder> {
+        match self.found {
+            Encoding::Utf16 => Some(Decoder::Known(Box::new(self.codec.new_decoder_without_bom_handling()))),
+            Encoding::Utf32 => Some(Decoder::Utf32 { big: self.big, rest: Vec::new() }),
+            _ => None,
+        }
     }
 
     /// A line as text. A line that is no UTF-8 in a file of it is taken for Latin-1: nothing is lost.
@@ -45,6 +57,13 @@ pub(super) fn detect(bytes: &[u8]) -> Result<Charset, ImportError> {
     if let Some(format) = foreign(bytes) {
         return Err(ImportError::Foreign { format });
     }
+    if let Some((mark, big)) = utf32::mark(bytes) {
+        if bytes[mark..].iter().all(|b| b.is_ascii_whitespace() || *b == 0) {
+            return Err(ImportError::Empty);
+        }
+        let charset = Charset::new(Encoding::Utf32, encoding_rs::UTF_8, mark);
+        return Ok(Charset { big, ..charset });
+    }
     if let Some((codec, mark)) = encoding_rs::Encoding::for_bom(bytes) {
         if bytes[mark..].iter().all(|b| b.is_ascii_whitespace() || *b == 0) {
             return Err(ImportError::Empty);
@@ -57,7 +76,7 @@ pub(super) fn detect(bytes: &[u8]) -> Result<Charset, ImportError> {
     }
     // A logger that lost its power leaves zeros at the end of its file.
     let written = bytes.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
-    let sample = &bytes[..written.min(65_536)];
+    let sample = without_blocks(&bytes[..written]);
     let odd = sample.iter().filter(|&&b| b == 0 || (b < 32 && !matches!(b, b'\t' | b'\n' | b'\r' | 12 | 26)));
     if odd.count() * 100 > sample.len() || sample.contains(&0) {
         return Err(ImportError::Binary);
@@ -73,6 +92,24 @@ pub(super) fn detect(bytes: &[u8]) -> Result<Charset, ImportError> {
         }
     }
     Ok(Charset::new(Encoding::Windows1252, encoding_rs::WINDOWS_1252, 0))
+}
+
+/// The first bytes of a file without blocks of zeros, which a logger that crashed leaves in its midst.
+fn without_blocks(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if memchr::memchr(0, bytes).is_none() {
+        return bytes[..bytes.len().min(JUDGED)].into();
+    }
+    let is_block = |run: &&[u8]| run[0] == 0 && run.len() >= BLOCK_OF_ZEROS;
+    let runs = bytes.chunk_by(|a, b| (*a == 0) == (*b == 0)).filter(|run| !is_block(run));
+    let mut text: Vec<u8> = Vec::new();
+    for run in runs {
+        text.extend_from_slice(run);
+        if text.len() >= JUDGED {
+            break;
+        }
+    }
+    text.truncate(JUDGED);
+    text.into()
 }
 
 /// The name of a known format that is no text.

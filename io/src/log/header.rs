@@ -13,6 +13,11 @@ pub(super) fn name_columns(lines: &[&str], layout: &mut Layout) {
     if layout.dialect.labelled {
         return name_by_labels(lines, layout);
     }
+    if let Some(split) = split_header(lines, layout) {
+        layout.header_line = Some(split.line + 1);
+        layout.names = read_names(&split.names, split.units.as_deref());
+        return;
+    }
     let block = header_block(lines, layout);
     let is_units = |row: &HeaderRow| is_unit_row(&row.1);
     let mut named = block.iter().filter(|row| block.len() == 1 || !is_units(row));
@@ -24,6 +29,57 @@ pub(super) fn name_columns(lines: &[&str], layout: &mut Layout) {
     let units = block.iter().find(|row| row.0 != *line && is_units(row)).map(|(_, fields)| fields);
     layout.header_line = Some(line + 1);
     layout.names = read_names(&under_groups(lines, *line, header, layout), units.map(Vec::as_slice));
+}
+
+/// A header of which the line next to the data names the time alone, and lines above it the other columns.
+struct SplitHeader {
+    /// Line of those names.
+    line: usize,
+    names: Vec<String>,
+    units: Option<Vec<String>>,
+}
+
+/// As recorders of Yokogawa write it: `Ch.,,,0001,0002`, `Tag,,,TI1,FI2`, `Unit,,,C,m3/h` over `Date,Time,sec,,`.
+fn split_header(lines: &[&str], layout: &Layout) -> Option<SplitHeader> {
+    let mut split = Vec::new();
+    let mut fields = |line: usize| -> Vec<String> {
+        layout.dialect.split(lines[line], &mut split);
+        layout.used.iter().map(|&at| split.get(at).copied().unwrap_or("").to_owned()).collect()
+    };
+    let next = layout.first_row.checked_sub(1)?;
+    let time = fields(next);
+    let width = time.iter().take_while(|field| !field.is_empty()).count();
+    let words = time[..width].iter().all(|f| !is_value(f, layout.decimal));
+    if width < 2 || width + 1 > time.len() || !words || time[width..].iter().any(|f| !f.is_empty()) {
+        return None;
+    }
+    let mut names: Option<(usize, Vec<String>, u8)> = None;
+    let mut units = None;
+    for line in (0..next).rev() {
+        let row = fields(line);
+        let is_above =
+            row[1..width].iter().all(String::is_empty) && row[width..].iter().any(|f| !f.is_empty());
+        if !is_above {
+            break;
+        }
+        if is_unit_row(&row) || row[0].to_lowercase().starts_with("unit") {
+            units = Some(row);
+            continue;
+        }
+        // Of tags, remarks and channels: what is called a tag and looks like one.
+        let whole = row[width..].iter().all(|f| !f.is_empty());
+        let called = row[0].to_lowercase().starts_with("tag");
+        let rank = 4 * u8::from(whole) + 2 * u8::from(is_tag_row(&row[width..])) + u8::from(called);
+        if names.as_ref().is_none_or(|best| rank >= best.2) {
+            names = Some((line, row, rank));
+        }
+    }
+    let (line, mut names, _) = names?;
+    names[..width].clone_from_slice(&time[..width]);
+    if let Some(units) = &mut units {
+        units[..width].iter_mut().for_each(String::clear);
+    }
+    Some(SplitHeader { line, names, units })
 }
 
 fn name_by_labels(lines: &[&str], layout: &mut Layout) {

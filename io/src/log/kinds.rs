@@ -1,6 +1,7 @@
 //! What the columns of a text file hold, judged by rows from all over it.
 
 use super::layout::{Layout, is_remark};
+use super::number::is_none;
 use super::read::Kind;
 use super::source::Sample;
 use super::stamp::{Stamp, parse as parse_stamp};
@@ -16,7 +17,7 @@ pub(super) fn kinds(sample: &Sample, layout: &Layout) -> Vec<Kind> {
     for line in rows.into_iter().step_by(stride).filter(|line| !is_remark(line)) {
         layout.dialect.split(line, &mut fields);
         for (counts, &at) in seen.iter_mut().zip(&layout.used) {
-            if let Some(field) = fields.get(at).filter(|f| !f.is_empty()) {
+            if let Some(field) = fields.get(at).filter(|f| !f.is_empty() && !is_none(f)) {
                 counts[kind(field, at, layout) as usize] += 1;
             }
         }

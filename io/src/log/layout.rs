@@ -34,6 +34,8 @@ pub(super) struct Layout {
     pub date_order: DateOrder,
     /// Whether the order of day and month is a guess.
     pub ambiguous_dates: bool,
+    /// Whether dates that read both ways are there, and some that show the order.
+    pub order_shown: bool,
     /// What the marks of each field are, where any stands ahead of three digits.
     pub marks: Vec<Option<Marks>>,
     /// Sample time that a header states, in seconds.
@@ -67,9 +69,10 @@ pub(super) fn is_blank(line: &str) -> bool {
     line.bytes().all(|b| b.is_ascii_whitespace() || b == 26 || b == 0)
 }
 
-/// Whether a field is a number or a time stamp.
+/// Whether a field is a number, one that there is none, or a time stamp.
 pub(super) fn is_value(field: &str, decimal: Decimal) -> bool {
-    number::parse_grouped(field, decimal).is_some()
+    number::is_none(field)
+        || number::parse_grouped(field, decimal).is_some()
         || number::parse_quantity(field, decimal, true).is_some()
         || parse_stamp(field, DateOrder::DayFirst).is_some()
         || parse_stamp(field, DateOrder::MonthFirst).is_some()
@@ -167,6 +170,7 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
         names: Vec::new(),
         date_order: DateOrder::DayFirst,
         ambiguous_dates: false,
+        order_shown: false,
         marks: Vec::new(),
         stated_sample_time_s: stated_sample_time(&lines[..rows[0]], decimal),
     };
@@ -181,6 +185,7 @@ pub(super) fn find(sample: &Sample, options: &ImportOptions) -> Result<Layout, I
     if let Some(order) = options.date_order {
         layout.date_order = order;
         layout.ambiguous_dates = false;
+        layout.order_shown = false;
     }
     name_columns(&lines, &mut layout);
     Ok(layout)
@@ -311,6 +316,7 @@ fn find_columns(rows: &[&str], layout: &mut Layout) {
     }
     layout.used = (0..layout.fields).filter(|&i| filled[i]).collect();
     (layout.date_order, layout.ambiguous_dates) = dates.order();
+    layout.order_shown = dates.any && !layout.ambiguous_dates;
 }
 
 /// What the dates of a file tell of their order: those that read one way only, and how long a log they make.

@@ -37,7 +37,15 @@ pub(super) fn parse(field: &str, decimal: Decimal) -> Option<f64> {
     }
 }
 
-/// The same where the mark that is not the decimal one groups thousands: `1.234` beside decimal commas is 1234.
+/// Whether a field says that there is no number, as programs in C print NaN and ∞; those of Windows `1.#QNAN`, `-1.#J`.
+pub(super) fn is_none(field: &str) -> bool {
+    const WORDS: [&str; 6] = ["nan", "inf", "infinity", "qnan", "nan(ind)", "nan(snan)"];
+    let bare = field.trim_start_matches(['-', '+']);
+    let is_word = || WORDS.iter().any(|word| bare.eq_ignore_ascii_case(word));
+    bare.starts_with("1.#") || bare.starts_with("1,#") || is_word()
+}
+
+/// [`parse`] where the mark that is not the decimal one groups thousands: `1.234` beside decimal commas is 1234.
 pub(super) fn parse_grouped(field: &str, decimal: Decimal) -> Option<f64> {
     let group = char::from(decimal.other().mark());
     let lone = || matches!(Shape::of(field), Shape::Lone(mark) if mark != decimal);

@@ -2,6 +2,7 @@
 //! sorted where their stamps allow it.
 
 use super::Repair;
+use super::corrected::carry_on;
 use super::read::Read;
 
 /// A share of repeated stamps above this means stamps coarser than the sampling.
@@ -39,13 +40,14 @@ pub(super) fn ordered(
     if down > 0 && down > 9 * up {
         keep.reverse();
         repairs.push(Repair::FallingTime);
-    } else if calendar && down as f64 > SHUFFLED * keep.len() as f64 {
+    } else if calendar && down > 1 && down as f64 > SHUFFLED * keep.len() as f64 {
         sort(&raw, &mut keep, read, repairs);
     }
     if calendar && !zoned {
         set_clock_on(&mut raw, &keep, read, repairs);
     }
     drop_strays(&raw, &mut keep, read, repairs);
+    carry_on(&mut raw, &mut keep, calendar, read, repairs);
     join_runs(&raw, &mut keep, calendar, read, repairs);
     let time_s = without_repeats(&raw, &mut keep, read, repairs);
     let all = keep.len() == raw.len() && keep.iter().enumerate().all(|(i, &k)| i == k as usize);

@@ -12,7 +12,7 @@ pub(super) struct Block {
 }
 
 /// The name without the number that tells equal names apart.
-fn base(name: &str) -> &str {
+pub(super) fn base(name: &str) -> &str {
     name.rsplit_once(" (").filter(|(_, n)| n.ends_with(')')).map_or(name, |(base, _)| base)
 }
 

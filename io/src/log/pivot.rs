@@ -87,7 +87,7 @@ const QUALITY_NAMES: [&str; 16] = [
 /// A signal needs this many values on average for names to be those of signals.
 const FEWEST_VALUES: usize = 2;
 /// OPC: a quality from here on is good; a historian's confidence in percent: from here on.
-const OPC_GOOD: f64 = 192.0;
+pub(super) const OPC_GOOD: f64 = 192.0;
 const CONFIDENT: f64 = 50.0;
 
 /// The columns of such a layout.
@@ -100,8 +100,14 @@ pub(super) struct Long {
     quality: Option<usize>,
 }
 
-fn normal(name: &str) -> String {
+/// Letters and digits of a name in lower case, without accents.
+pub(super) fn normal(name: &str) -> String {
     name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).map(super::roles::plain).collect()
+}
+
+/// Whether a name is one of a quality.
+pub(super) fn is_quality_name(name: &str) -> bool {
+    QUALITY_NAMES.contains(&normal(name).as_str())
 }
 
 fn named(read: &Read, names: &[&str], fits: impl Fn(&ReadColumn) -> bool) -> Option<usize> {
@@ -310,7 +316,7 @@ fn settle_words(read: &Read, long: &Long, series: &mut [Series], words: &[usize]
 }
 
 /// Which rows a column of qualities calls good.
-fn good_rows(column: &ReadColumn) -> Vec<bool> {
+pub(super) fn good_rows(column: &ReadColumn) -> Vec<bool> {
     if column.kind == Kind::Words {
         let bad: Vec<bool> = column.states.iter().map(|s| is_bad(s)).collect();
         return column.values.iter().map(|v| !v.is_finite() || !bad[*v as usize]).collect();
@@ -326,9 +332,11 @@ fn good_rows(column: &ReadColumn) -> Vec<bool> {
     column.values.iter().map(|v| !v.is_finite() || *v >= least).collect()
 }
 
-fn is_bad(word: &str) -> bool {
+/// Whether a word calls a value bad.
+pub(super) fn is_bad(word: &str) -> bool {
     let word = word.to_lowercase();
-    ["bad", "false", "invalid", "no", "ruim", "schlecht", "ungültig", "comm"]
+    let none = word == "no" || word.starts_with("no ") || word.starts_with("not ");
+    none || ["bad", "false", "invalid", "ruim", "schlecht", "ungültig", "comm"]
         .iter()
         .any(|b| word.starts_with(b))
 }

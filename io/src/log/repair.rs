@@ -23,6 +23,29 @@ pub enum Repair {
         /// What stood there first.
         text: String,
     },
+    /// Numbers that stand for none: taken as missing.
+    StandIns {
+        /// Column.
+        column: String,
+        /// How many.
+        count: usize,
+        /// First line of them.
+        line: usize,
+        /// The number.
+        value: f64,
+    },
+    /// A block of zeros, as a crash leaves it.
+    Zeros {
+        /// Its bytes; of several blocks, all.
+        bytes: usize,
+        /// Line that the first is in.
+        line: usize,
+    },
+    /// A row that was cut off while it was written: left out.
+    TornRow {
+        /// Its line.
+        line: usize,
+    },
     /// Lines that are no rows of data.
     SkippedLines {
         /// How many.
@@ -100,6 +123,22 @@ pub enum Repair {
     /// The clock was set back by an hour, as at the end of summer time: what follows was moved on.
     ClockSetBack {
         /// First line after it.
+        line: usize,
+    },
+    /// The clock was corrected: what follows was moved on, to one sample time behind the last row before.
+    ClockStepsBack {
+        /// How often.
+        count: usize,
+        /// First line after the first step.
+        line: usize,
+        /// By how many seconds that goes back.
+        back_s: f64,
+    },
+    /// Rows that stand in the file twice, one run of them behind another.
+    RepeatedRows {
+        /// How many were left out.
+        count: usize,
+        /// First line of them.
         line: usize,
     },
     /// Columns of stamps beside the time: left out.
@@ -261,6 +300,15 @@ pub enum Repair {
         /// Month/day was taken: the clock has AM and PM.
         month_first: bool,
     },
+    /// Dates that read both ways, of which another file tells the order.
+    DatesByFile {
+        /// That file.
+        file: String,
+        /// Whether the month stands first.
+        month_first: bool,
+    },
+    /// Stamps without a year: time counts from the 1st of January.
+    NoYear,
     /// No time in the file.
     NoTimeColumn {
         /// Sample time taken, in seconds.

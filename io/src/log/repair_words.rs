@@ -11,6 +11,17 @@ impl std::fmt::Display for Repair {
             Self::MissingValues { column, count, line, text } => {
                 write!(f, "values missing in {column}: {count}, the first in line {line} ('{text}')")
             }
+            Self::StandIns { column, count, line, value } => write!(
+                f,
+                "values of {column} that stand for none were taken as missing: {count} of {}, the first in line {line}",
+                number(*value)
+            ),
+            Self::Zeros { bytes, line } => {
+                write!(f, "{bytes} bytes of zero in line {line}, as a crash leaves them: passed over")
+            }
+            Self::TornRow { line } => {
+                write!(f, "the row in line {line} was cut off while it was written: left out")
+            }
             Self::SkippedLines { count, line } => {
                 write!(f, "lines skipped because they are no rows of data: {count}, the first is line {line}")
             }
@@ -66,6 +77,17 @@ impl std::fmt::Display for Repair {
                 f,
                 "the clock goes back by an hour in line {line}, as at the end of summer time: the rows from there on were moved on by an hour"
             ),
+            Self::ClockStepsBack { count, line, back_s } => write!(
+                f,
+                "steps back of the clock: {count}, the first in line {line} by {} s; the rows from there on were moved on to follow one sample time behind",
+                number(*back_s)
+            ),
+            Self::RepeatedRows { count, line } => {
+                write!(
+                    f,
+                    "rows left out because they stand in the file before: {count}, the first is line {line}"
+                )
+            }
             Self::SpareTime { column } => {
                 write!(f, "column {column} holds time stamps beside those of the time axis: left out")
             }
@@ -145,6 +167,17 @@ impl std::fmt::Display for Repair {
                 f,
                 "the dates read as day/month and as month/day: month/day was taken, as their clock has AM and PM"
             ),
+            Self::DatesByFile { file, month_first: false } => write!(
+                f,
+                "the dates read as day/month and as month/day: day/month was taken, as {file} shows"
+            ),
+            Self::DatesByFile { file, month_first: true } => write!(
+                f,
+                "the dates read as day/month and as month/day: month/day was taken, as {file} shows"
+            ),
+            Self::NoYear => {
+                write!(f, "the time stamps have no year: time is counted from the 1st of January")
+            }
             Self::NoTimeColumn { sample_time_s } => write!(
                 f,
                 "the file has no time column: rows were taken to be {} s apart; give the sample time",
@@ -158,6 +191,9 @@ impl Explain for Repair {
     fn key(&self) -> &'static str {
         match self {
             Self::MissingValues { .. } => "repair.missing_values",
+            Self::StandIns { .. } => "repair.stand_ins",
+            Self::Zeros { .. } => "repair.zeros",
+            Self::TornRow { .. } => "repair.torn_row",
             Self::SkippedLines { .. } => "repair.skipped_lines",
             Self::RaggedRows { .. } => "repair.ragged_rows",
             Self::TextColumn { .. } => "repair.text_column",
@@ -170,6 +206,8 @@ impl Explain for Repair {
             Self::FallingTime => "repair.falling_time",
             Self::SortedRows { .. } => "repair.sorted_rows",
             Self::ClockSetBack { .. } => "repair.clock_set_back",
+            Self::ClockStepsBack { .. } => "repair.clock_steps_back",
+            Self::RepeatedRows { .. } => "repair.repeated_rows",
             Self::SpareTime { .. } => "repair.spare_time",
             Self::LongLayout { .. } => "repair.long_layout",
             Self::BadQuality { .. } => "repair.bad_quality",
@@ -191,6 +229,9 @@ impl Explain for Repair {
             Self::ThousandsOrDecimals { .. } => "repair.thousands_or_decimals",
             Self::AmbiguousDates { month_first: false } => "repair.ambiguous_dates",
             Self::AmbiguousDates { month_first: true } => "repair.ambiguous_dates_month_first",
+            Self::DatesByFile { month_first: false, .. } => "repair.dates_by_file",
+            Self::DatesByFile { month_first: true, .. } => "repair.dates_by_file_month_first",
+            Self::NoYear => "repair.no_year",
             Self::NoTimeColumn { .. } => "repair.no_time_column",
         }
     }
@@ -208,7 +249,19 @@ impl Explain for Repair {
                 vec![("count", count.to_string()), ("line", line.to_string()), ("fields", fields.to_string())]
             }
             Self::TextColumn { column } => vec![("column", column.clone())],
+            Self::StandIns { column, count, line, value } => vec![
+                ("column", column.clone()),
+                ("count", count.to_string()),
+                ("line", line.to_string()),
+                ("value", number(*value)),
+            ],
+            Self::Zeros { bytes, line } => vec![("bytes", bytes.to_string()), ("line", line.to_string())],
+            Self::TornRow { line } => vec![("line", line.to_string())],
+            Self::ClockStepsBack { count, line, back_s } => {
+                vec![("count", count.to_string()), ("line", line.to_string()), ("back_s", number(*back_s))]
+            }
             Self::SkippedLines { count, line }
+            | Self::RepeatedRows { count, line }
             | Self::NoTime { count, line }
             | Self::DuplicateStamps { count, line }
             | Self::StrayStamps { count, line } => {
@@ -282,7 +335,8 @@ impl Explain for Repair {
                 ("value", number(*value)),
                 ("other", number(*other)),
             ],
-            Self::AmbiguousDates { .. } => Vec::new(),
+            Self::DatesByFile { file, .. } => vec![("file", file.clone())],
+            Self::AmbiguousDates { .. } | Self::NoYear => Vec::new(),
             Self::NoTimeColumn { sample_time_s } => vec![("sample_time_s", number(*sample_time_s))],
         }
     }
@@ -295,6 +349,9 @@ impl Repair {
         let column = "LT-103".to_owned();
         vec![
             Self::MissingValues { column: column.clone(), count: 4, line: 17, text: "Bad".to_owned() },
+            Self::StandIns { column: column.clone(), count: 11, line: 23, value: -999.25 },
+            Self::Zeros { bytes: 4096, line: 88 },
+            Self::TornRow { line: 901 },
             Self::SkippedLines { count: 2, line: 9 },
             Self::RaggedRows { count: 3, line: 31, fields: 5 },
             Self::TextColumn { column: column.clone() },
@@ -313,6 +370,7 @@ impl Repair {
             },
             Self::AmbiguousDates { month_first: false },
             Self::AmbiguousDates { month_first: true },
+            Self::NoYear,
             Self::NoTimeColumn { sample_time_s: 1.0 },
         ]
         .into_iter()
@@ -327,6 +385,8 @@ impl Repair {
             Self::FallingTime,
             Self::SortedRows { line: 12 },
             Self::ClockSetBack { line: 180 },
+            Self::ClockStepsBack { count: 3, line: 702, back_s: 44.5 },
+            Self::RepeatedRows { count: 30, line: 152 },
             Self::SpareTime { column: column.clone() },
             Self::LongLayout { column: "VarName".to_owned(), signals: 3, rows: 900 },
             Self::BadQuality { column: "Validity".to_owned(), count: 5, line: 31 },
@@ -340,6 +400,8 @@ impl Repair {
             Self::OtherSheets { sheet: "Data".to_owned(), others: "Notes".to_owned() },
             Self::OtherRuns { run: "stad 2".to_owned(), others: 1 },
             Self::Recording { flaw: RecordingFlaw::Cut { path: file.clone(), at: 12_000 } },
+            Self::DatesByFile { file: file.clone(), month_first: false },
+            Self::DatesByFile { file: file.clone(), month_first: true },
             Self::FileJoined { file: file.clone(), line: 801, rows: 700 },
             Self::FileMerged { file: file.clone(), columns: 2 },
             Self::Appended { file: file.clone(), step_s: 0.2 },

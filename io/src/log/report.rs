@@ -12,6 +12,8 @@ pub enum Encoding {
     Utf8,
     /// UTF-16 with a byte order mark.
     Utf16,
+    /// UTF-32 with a byte order mark.
+    Utf32,
     /// Latin-1 in its Windows form.
     Windows1252,
     /// Chinese.
@@ -61,7 +63,9 @@ pub enum TimeKind {
     ExcelSerials,
     /// Days since the year 0, as MATLAB counts.
     MatlabDays,
-    /// Seconds since 1970 or 1904, or thousandths, millionths or billionths of them.
+    /// Days since noon of 1 January 4713 BC, as astronomers count, or the same less 2,400,000.5.
+    JulianDays,
+    /// Seconds since 1970 or 1904, or thousandths, millionths or billionths of them; 100 ns since 1601 or the year 1.
     Epoch,
     /// None: rows were taken to be this far apart.
     Missing {

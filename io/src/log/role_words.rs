@@ -3,7 +3,7 @@
 use super::roles::Role;
 
 /// Words that can mean nothing else, in loop and historian tags.
-pub(super) const CERTAIN: [(&str, Role); 53] = [
+pub(super) const CERTAIN: &[(&str, Role)] = &[
     ("out", Role::Mv),
     ("lmn", Role::Mv),
     ("stellgroße", Role::Mv),
@@ -57,10 +57,36 @@ pub(super) const CERTAIN: [(&str, Role); 53] = [
     ("automan", Role::Mode),
     ("am", Role::Mode),
     ("betriebsart", Role::Mode),
+    ("consigna", Role::Sp),
+    ("ajuste", Role::Sp),
+    ("setpunt", Role::Sp),
+    ("soll", Role::Sp),
+    ("zadana", Role::Sp),
+    ("задание", Role::Sp),
+    ("уставка", Role::Sp),
+    ("riferimento", Role::Sp),
+    ("設定", Role::Sp),
+    ("目標", Role::Sp),
+    ("目标", Role::Sp),
+    ("설정", Role::Sp),
+    ("medicion", Role::Pv),
+    ("ist", Role::Pv),
+    ("meetwaarde", Role::Pv),
+    ("misura", Role::Pv),
+    ("pomiar", Role::Pv),
+    ("измерение", Role::Pv),
+    ("测量", Role::Pv),
+    ("測定", Role::Pv),
+    ("現在値", Role::Pv),
+    ("过程值", Role::Pv),
+    ("측정", Role::Pv),
+    ("操作量", Role::Mv),
+    ("mando", Role::Mv),
+    ("commande", Role::Mv),
 ];
 
 /// Words of quantities and devices, which lean one way.
-pub(super) const LIKELY: [(&str, Role); 82] = [
+pub(super) const LIKELY: &[(&str, Role)] = &[
     ("fullstand", Role::Pv),
     ("temperatur", Role::Pv),
     ("druck", Role::Pv),
@@ -142,5 +168,43 @@ pub(super) const LIKELY: [(&str, Role); 82] = [
     ("r", Role::Sp),
     ("w", Role::Sp),
     ("ysp", Role::Sp),
-    ("status", Role::Mode),
+    ("presion", Role::Pv),
+    ("caudal", Role::Mv),
+    ("температура", Role::Pv),
+    ("давление", Role::Pv),
+    ("уровень", Role::Pv),
+    ("расход", Role::Mv),
+    ("клапан", Role::Mv),
+    ("salida", Role::Mv),
+    ("sortie", Role::Mv),
+    ("uscita", Role::Mv),
+    ("uitgang", Role::Mv),
+    ("ausgang", Role::Mv),
+    ("выход", Role::Mv),
+    ("wyjscie", Role::Mv),
+    ("输出", Role::Mv),
+    ("出力", Role::Mv),
+    ("출력", Role::Mv),
+];
+
+/// Words of a controller's output, and of what leaves a vessel: beside a quantity they are the latter.
+pub(super) const OUTPUTS: [&str; 12] = [
+    "output",
+    "saida",
+    "salida",
+    "sortie",
+    "uscita",
+    "uitgang",
+    "ausgang",
+    "выход",
+    "wyjscie",
+    "输出",
+    "出力",
+    "출력",
+];
+
+/// Words that a mode of a controller begins with.
+pub(super) const MODES: [&str; 22] = [
+    "auto", "aut", "man", "manu", "hand", "cas", "kask", "rcas", "rsp", "rout", "iman", "loc", "lok", "rem",
+    "fern", "oos", "авто", "руч", "自动", "手动", "自動", "手動",
 ];

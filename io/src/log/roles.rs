@@ -4,7 +4,7 @@ use vasos_engine::signal::LogTable;
 
 use super::Roles;
 use super::behaviour::{Behaviour, Motion};
-use super::role_words::{CERTAIN, LIKELY};
+use super::role_words::{CERTAIN, LIKELY, MODES, OUTPUTS};
 
 /// A part of a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,14 +39,13 @@ pub(super) fn propose(table: &LogTable) -> Roles {
     let mut sp = best_named(&hints, Role::Sp, &taken, |i| (true, kin(i)));
     taken.extend(sp);
     let not_words: Vec<usize> = taken.iter().copied().filter(|i| !words.contains(i)).collect();
+    // A flag of a pump is no mode, and neither is a remark here and there.
     let mode = best_named(&hints, Role::Mode, &not_words, |i| (true, kin(i))).or_else(|| {
-        // A remark here and there is no mode.
-        let is_quality = |i: &usize| {
-            let name = columns[*i].name.to_lowercase();
-            ["quality", "validity", "qualidade", "gültigkeit"].iter().any(|q| name.contains(q))
-        };
         let filled = |i: &usize| columns[*i].values.iter().filter(|v| v.is_finite()).count();
-        words.iter().copied().find(|i| 2 * filled(i) >= table.len() && !is_quality(i))
+        words
+            .iter()
+            .copied()
+            .find(|i| 2 * filled(i) >= table.len() && columns[*i].states.iter().any(|s| is_mode(s)))
     });
     taken.extend(mode);
     // A likely name on a column that never moves gives way to one that does.
@@ -114,7 +113,7 @@ fn kinship(a: &str, b: &str) -> usize {
 
 fn hint(name: &str, unit: Option<&str>) -> Option<Hint> {
     let mut words = words(name);
-    let certain = |word: &str| CERTAIN.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
+    let certain = |word: &str| role_of(word, CERTAIN).or_else(|| german(word));
     // PV.CV is the current value of the PV.
     if let [.., part, "cv" | "value" | "val"] = words.iter().map(String::as_str).collect::<Vec<_>>()[..]
         && certain(part).is_some()
@@ -133,14 +132,51 @@ fn hint(name: &str, unit: Option<&str>) -> Option<Hint> {
     if let Some(role) = words.iter().find_map(|w| certain(w)) {
         return Some(Hint { role, weight: 2 });
     }
-    let likely = |word: &str| LIKELY.iter().find(|(w, _)| *w == word).map(|(_, role)| *role);
-    let by_word = words.iter().rev().find_map(|w| likely(w));
+    let likely = |word: &str| role_of(word, LIKELY);
+    let by_word = words.iter().rev().find_map(|w| Some((w, likely(w)?)));
+    let is_quantity = || words.iter().any(|w| likely(w) == Some(Role::Pv));
+    let by_word = by_word
+        .map(|(word, role)| if OUTPUTS.contains(&word.as_str()) && is_quantity() { Role::Pv } else { role });
     let by_unit = || match unit?.to_lowercase().as_str() {
         "v" | "volts" | "pwm" => Some(Role::Mv),
         "cm" | "mm" | "°c" | "degc" | "degf" | "k" | "bar" | "kpa" => Some(Role::Pv),
         _ => None,
     };
     by_word.or_else(by_unit).map(|role| Hint { role, weight: 1 })
+}
+
+/// Whether a state is a mode of a controller.
+fn is_mode(state: &str) -> bool {
+    words(state).iter().any(|word| {
+        let begins = |mode: &&str| (mode.chars().count() > 3 || !mode.is_ascii()) && word.starts_with(*mode);
+        let long = ["cascade", "cascata", "local", "lokal", "remote", "remoto"];
+        MODES.contains(&word.as_str()) || MODES.iter().any(begins) || long.contains(&word.as_str())
+    })
+}
+
+/// What a table says of a word; words of Chinese, Japanese and Korean stand in others without blanks between.
+fn role_of(word: &str, table: &[(&str, Role)]) -> Option<Role> {
+    let is_ideograph = |c: char| c >= '\u{2e80}';
+    let inside = |w: &str| w.contains(is_ideograph) && word.contains(w);
+    let exact = table.iter().find(|(w, _)| *w == word);
+    exact.or_else(|| table.iter().find(|(w, _)| inside(w))).map(|(_, role)| *role)
+}
+
+/// `solltemperatur`, `isttemperatur`, `fullstandsollwert`, `reglerausgang`.
+fn german(word: &str) -> Option<Role> {
+    let quantity = |part: &str| role_of(part, LIKELY).is_some();
+    let ends = [
+        ("sollwert", Role::Sp),
+        ("istwert", Role::Pv),
+        ("stellwert", Role::Mv),
+        ("stellgroße", Role::Mv),
+        ("reglerausgang", Role::Mv),
+    ];
+    let begins = [("soll", Role::Sp), ("ist", Role::Pv)];
+    let by_end = ends.iter().find(|(end, _)| word.ends_with(end));
+    by_end
+        .or_else(|| begins.iter().find(|(b, _)| word.strip_prefix(b).is_some_and(quantity)))
+        .map(|(_, role)| *role)
 }
 
 /// Words of a name in lower case without accents: `23LIC0001:InternalSetpoint`, `bomba_1`, `T1`.
@@ -171,7 +207,13 @@ pub(super) fn plain(c: char) -> char {
         'í' | 'ì' => 'i',
         'ó' | 'ô' | 'õ' | 'ö' => 'o',
         'ú' | 'ü' => 'u',
-        'ç' => 'c',
+        'ç' | 'ć' => 'c',
+        'ñ' | 'ń' => 'n',
+        'ś' => 's',
+        'ą' => 'a',
+        'ę' => 'e',
+        'ł' => 'l',
+        'ź' | 'ż' => 'z',
         c => c,
     }
 }

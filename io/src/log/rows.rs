@@ -2,15 +2,16 @@
 
 use std::io::{Read as Input, Seek};
 
-use super::decode::Charset;
+use super::decode::{BLOCK_OF_ZEROS, Charset};
 use super::fast::{Slot, Taken, quick_row};
 use super::kinds::kinds;
 use super::layout::{Layout, is_blank, is_remark};
 use super::marks::Marks;
 use super::quotes::{FOLD, unfolded};
 use super::read::{Kind, Read, ReadColumn};
-use super::source::{Blocks, Sample};
+use super::source::{Block, Blocks, Sample};
 use super::stamp::{DateOrder, Stamp, StampReader, parse as parse_stamp};
+use super::torn::is_torn;
 use super::{ImportError, Repair};
 
 /// Letters of a text that could not be read that are told.
@@ -43,6 +44,7 @@ pub(super) fn read<R: Input + Seek>(
             Some(Again::Order(order)) => {
                 layout.date_order = order;
                 layout.ambiguous_dates = false;
+                layout.order_shown = true;
             }
             Some(Again::Fields) => {
                 let names = std::mem::take(&mut layout.names);
@@ -55,7 +57,12 @@ pub(super) fn read<R: Input + Seek>(
                 layout.used = (0..layout.fields).collect();
             }
             None if reader.lines.len() < 2 => return Err(ImportError::OneRow { line: layout.first_row + 1 }),
-            None => return Ok(reader.finish(repairs)),
+            None => {
+                let shown = layout.ambiguous_dates && reader.shows_order();
+                let read = reader.finish(repairs);
+                layout.order_shown |= shown;
+                return Ok(read);
+            }
         }
     }
 }
@@ -83,7 +90,22 @@ struct Missing {
     text: String,
 }
 
+/// A line in its block.
+#[derive(Debug, Clone, Copy)]
+struct Line<'a> {
+    /// Counted from 1.
+    number: usize,
+    block: &'a [u8],
+    start: usize,
+    end: usize,
+    /// Rows ahead of it in the file.
+    before: usize,
+    /// Whether the file ends with it, without a line end.
+    open: bool,
+}
+
 struct Reader<'a> {
+    sample: &'a Sample,
     layout: &'a Layout,
     charset: Charset,
     columns: Vec<ReadColumn>,
@@ -94,6 +116,12 @@ struct Reader<'a> {
     lines: Vec<u32>,
     skipped: Tally,
     ragged: Tally,
+    /// What was missing ahead of the first row with too few fields.
+    before_short: Option<Vec<Missing>>,
+    /// Bytes of zero in blocks, and the lines of rows that were cut off.
+    zeros: usize,
+    zeros_line: usize,
+    torn: Vec<usize>,
     /// What each field of a line goes to, where lines can be read without splitting them.
     slots: Vec<Slot>,
     /// Columns found empty in a line.
@@ -102,7 +130,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(sample: &Sample, layout: &'a Layout) -> Self {
+    fn new(sample: &'a Sample, layout: &'a Layout) -> Self {
         let kinds = kinds(sample, layout);
         let separator = layout.dialect.separator;
         // Where one sign is separator and decimal mark, quotes tell them apart.
@@ -121,6 +149,7 @@ impl<'a> Reader<'a> {
             ReadColumn::new(name.name.clone(), name.unit.clone(), kind, Vec::with_capacity(rows))
         });
         Self {
+            sample,
             layout,
             charset: sample.charset,
             columns: columns.collect(),
@@ -130,6 +159,10 @@ impl<'a> Reader<'a> {
             lines: Vec::with_capacity(rows),
             skipped: Tally::default(),
             ragged: Tally::default(),
+            before_short: None,
+            zeros: 0,
+            zeros_line: 0,
+            torn: Vec::new(),
             slots,
             blanks: Vec::new(),
             again: None,
@@ -143,7 +176,7 @@ impl<'a> Reader<'a> {
     ) -> Result<Option<Again>, ImportError> {
         // Rows counted, and lines: a row with a remark of several lines has as many.
         let (mut index, mut number) = (0, 0);
-        while let Some(block) = blocks.next()? {
+        while let Some(Block { text: block, last }) = blocks.next()? {
             let mut start = 0;
             let folded = memchr::memchr(FOLD, block).is_some();
             while start < block.len() {
@@ -151,7 +184,9 @@ impl<'a> Reader<'a> {
                 index += 1;
                 number += 1;
                 if index > self.layout.first_row {
-                    self.line(number, block, start, end);
+                    let before = index - 1 - self.layout.first_row;
+                    let open = last && end == block.len();
+                    self.line(Line { number, block, start, end, before, open });
                 }
                 if folded {
                     number += memchr::memchr_iter(FOLD, &block[start..end]).count();
@@ -165,12 +200,14 @@ impl<'a> Reader<'a> {
         Ok(self.again)
     }
 
-    fn line(&mut self, number: usize, block: &[u8], start: usize, end: usize) {
-        let end = if end > start && block[end - 1] == b'\r' { end - 1 } else { end };
+    fn line(&mut self, line: Line) {
+        let Line { number, block, start, end, open, .. } = line;
+        let has_return = end > start && block[end - 1] == b'\r';
+        let end = if has_return { end - 1 } else { end };
         if start == end {
             return;
         }
-        if !self.slots.is_empty() {
+        if !self.slots.is_empty() && !open {
             let taken = Taken {
                 columns: &mut self.columns,
                 stamps: &mut self.stamps,
@@ -191,11 +228,66 @@ impl<'a> Reader<'a> {
         }
         let charset = self.charset;
         let text = unfolded(charset.text(&block[start..end]));
-        if is_remark(&text) {
+        if text.contains('\0') {
+            self.around_zeros(&text, line);
+        } else if open && !has_return && self.is_cut(&text, line) {
+            self.torn.push(number);
+        } else {
+            self.text(number, &text);
+        }
+    }
+
+    /// What stands around the zeros of a crash: a row that was being written ahead of them, rows behind.
+    fn around_zeros(&mut self, text: &str, line: Line) {
+        let mut piece = 0;
+        let mut at = 0;
+        for run in text.as_bytes().chunk_by(|a, b| (*a == 0) == (*b == 0)) {
+            if run[0] == 0 && run.len() >= BLOCK_OF_ZEROS {
+                if self.zeros == 0 {
+                    self.zeros_line = line.number;
+                }
+                self.zeros += run.len();
+                let ahead = &text[piece..at];
+                if !is_blank(ahead) && self.is_cut(ahead, line) {
+                    self.torn.push(line.number);
+                } else if !is_blank(ahead) {
+                    self.text(line.number, ahead);
+                }
+                piece = at + run.len();
+            }
+            at += run.len();
+        }
+        let behind = &text[piece..];
+        if line.open && !is_blank(behind) && self.is_cut(behind, line) {
+            self.torn.push(line.number);
+        } else {
+            self.text(line.number, behind);
+        }
+    }
+
+    /// Whether the rows before a text say that it is none of theirs, but the beginning of one.
+    fn is_cut(&self, text: &str, line: Line) -> bool {
+        let end = if self.sample.line_end == b'\n' { '\n' } else { '\r' };
+        let above = self.charset.text(&line.block[..line.start]);
+        let above: Vec<&str> = above
+            .trim_end_matches(end)
+            .rsplit(end)
+            .take(line.before)
+            .map(|row| row.trim_end_matches('\r'))
+            .collect();
+        let here = above.len() == line.before;
+        let sample = if here { &[] } else { self.sample.head.get(self.layout.first_row..).unwrap_or(&[]) };
+        // The sample of a short file ends with the very row.
+        let sample = sample.iter().map(String::as_str).filter(|row| *row != text);
+        is_torn(text, above.into_iter().chain(sample), self.layout)
+    }
+
+    fn text(&mut self, number: usize, text: &str) {
+        if is_remark(text) {
             self.skipped.add(number);
-        } else if !is_blank(&text) {
+        } else if !is_blank(text) {
             let mut fields = Vec::new();
-            self.layout.dialect.split(&text, &mut fields);
+            self.layout.dialect.split(text, &mut fields);
             self.row(number, &fields);
         }
     }
@@ -219,6 +311,9 @@ impl<'a> Reader<'a> {
         self.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
         let extra = fields.iter().skip(layout.fields).any(|f| !f.is_empty());
         let short = fields.len() <= layout.used.last().copied().unwrap_or(0);
+        if short && self.before_short.is_none() {
+            self.before_short = Some(self.missing.clone());
+        }
         if extra || short {
             self.ragged.add(line);
         }
@@ -285,7 +380,33 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Takes the last row back if it alone of all rows has too few fields: it was cut off.
+    fn take_back_short_end(&mut self) {
+        let last = self.lines.last().map_or(0, |line| *line as usize);
+        if let (1, Some(missing)) = (self.ragged.count, self.before_short.take())
+            && self.ragged.line == last
+            && self.lines.len() > 2
+        {
+            self.lines.pop();
+            let rows = self.lines.len();
+            self.columns.iter_mut().for_each(|c| c.values.truncate(rows));
+            self.missing = missing;
+            self.ragged = Tally::default();
+            self.torn.push(last);
+        }
+    }
+
+    fn shows_order(&self) -> bool {
+        self.stamps.iter().any(|s| s.day_first || s.month_first)
+    }
+
     fn finish(mut self, repairs: &mut Vec<Repair>) -> Read {
+        self.take_back_short_end();
+        let shows_order = self.shows_order();
+        if self.zeros > 0 {
+            repairs.push(Repair::Zeros { bytes: self.zeros, line: self.zeros_line });
+        }
+        repairs.extend(self.torn.iter().map(|&line| Repair::TornRow { line }));
         if self.skipped.count > 0 {
             repairs.push(Repair::SkippedLines { count: self.skipped.count, line: self.skipped.line });
         }
@@ -323,8 +444,7 @@ impl<'a> Reader<'a> {
                 .then_some((column.name.as_str(), marks))
         });
         repairs.extend(Marks::repairs(marked));
-        let order_told = self.stamps.iter().any(|s| s.day_first || s.month_first);
-        if self.layout.ambiguous_dates && !order_told {
+        if self.layout.ambiguous_dates && !shows_order {
             let month_first = self.layout.date_order == DateOrder::MonthFirst;
             repairs.push(Repair::AmbiguousDates { month_first });
         }

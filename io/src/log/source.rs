@@ -5,6 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use super::ImportError;
 use super::decode::{Charset, detect};
 use super::quotes::{fold, unfolded};
+use super::utf32::Decoder;
 
 /// Bytes read at once.
 const BLOCK: usize = 1 << 18;
@@ -52,7 +53,7 @@ impl Sample {
             let room = length - HEAD as u64;
             for k in 0..STRETCHES {
                 let at = HEAD as u64 + room / STRETCHES * k;
-                let bytes = read_at(input, at & !1, STRETCH)?;
+                let bytes = read_at(input, at & !3, STRETCH)?;
                 let part = lines_of(&decoded(&charset, &bytes), line_end, &charset);
                 // The first and the last are cut.
                 let count = part.len();
@@ -74,10 +75,9 @@ fn read_at<R: Read + Seek>(input: &mut R, at: u64, count: usize) -> Result<Vec<u
 
 fn decoded(charset: &Charset, bytes: &[u8]) -> Vec<u8> {
     let Some(mut decoder) = charset.decoder() else { return bytes.to_vec() };
-    let mut text =
-        String::with_capacity(decoder.max_utf8_buffer_length(bytes.len()).unwrap_or(bytes.len() * 3));
-    let _ = decoder.decode_to_string(bytes, &mut text, true);
-    text.into_bytes()
+    let mut text = Vec::new();
+    decoder.decode(bytes, true, &mut text);
+    text
 }
 
 fn lines_of(text: &[u8], line_end: u8, charset: &Charset) -> Vec<String> {
@@ -87,10 +87,17 @@ fn lines_of(text: &[u8], line_end: u8, charset: &Charset) -> Vec<String> {
         .collect()
 }
 
+/// Whole lines of a file; `last`: with its end.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Block<'a> {
+    pub text: &'a [u8],
+    pub last: bool,
+}
+
 /// The lines of a file, block by block.
 pub(super) struct Blocks<R> {
     input: R,
-    decoder: Option<encoding_rs::Decoder>,
+    decoder: Option<Decoder>,
     line_end: u8,
     raw: Vec<u8>,
     text: Vec<u8>,
@@ -121,7 +128,7 @@ impl<R: Read + Seek> Blocks<R> {
     ///
     /// # Errors
     /// [`ImportError::Read`]
-    pub fn next(&mut self) -> Result<Option<&[u8]>, ImportError> {
+    pub fn next(&mut self) -> Result<Option<Block<'_>>, ImportError> {
         self.text.drain(..self.given);
         self.given = 0;
         let mut searched = 0;
@@ -130,13 +137,14 @@ impl<R: Read + Seek> Blocks<R> {
                 let whole = fold(&mut self.text[..=searched + last], self.line_end);
                 if whole > 0 {
                     self.given = whole;
-                    return Ok(Some(&self.text[..whole]));
+                    return Ok(Some(Block { text: &self.text[..whole], last: false }));
                 }
             }
             if self.ended || self.text.len() > LONGEST_LINE {
                 fold(&mut self.text, self.line_end);
                 self.given = self.text.len();
-                return Ok((self.given > 0).then_some(&self.text[..self.given]));
+                let last = self.ended;
+                return Ok((self.given > 0).then_some(Block { text: &self.text[..self.given], last }));
             }
             searched = self.text.len();
             self.fill()?;
@@ -148,12 +156,7 @@ impl<R: Read + Seek> Blocks<R> {
         self.ended = count == 0;
         match &mut self.decoder {
             None => self.text.extend_from_slice(&self.raw[..count]),
-            Some(decoder) => {
-                let room = decoder.max_utf8_buffer_length(count).unwrap_or(3 * count + 16);
-                let mut text = String::with_capacity(room);
-                let _ = decoder.decode_to_string(&self.raw[..count], &mut text, self.ended);
-                self.text.extend_from_slice(text.as_bytes());
-            }
+            Some(decoder) => decoder.decode(&self.raw[..count], self.ended, &mut self.text),
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 //! A stamp with a zone comes out in UTC, one without on the file's own clock.
 
 use super::calendar::{days_from_civil, month};
+use super::iec::iec;
 
 /// Seconds of a day.
 pub(super) const DAY_S: f64 = 86_400.0;
@@ -57,7 +58,7 @@ pub(super) fn parse(field: &str, order: DateOrder) -> Option<Stamp> {
         return None;
     }
     if first.is_alphabetic() {
-        return spelled(field);
+        return if field.contains('#') { iec(field, order) } else { spelled(field) };
     }
     if !first.is_ascii_digit() {
         return None;
@@ -77,6 +78,12 @@ pub(super) fn parse(field: &str, order: DateOrder) -> Option<Stamp> {
             .replace(['时', '時', '分'], ":")
             .replace('秒', "");
         return parse(plain.trim(), order);
+    }
+    // 2024:180:14:35:00
+    if let (Some((date, clock)), Some(b':')) = (field.split_at_checked(8), field.as_bytes().get(4))
+        && let (Some(midnight), Some(clock)) = (day_of_year(date), clock.strip_prefix(':'))
+    {
+        return full(midnight, clock);
     }
     let comma = || field.find(", ").filter(|&i| i >= 6);
     let cut = comma()
@@ -124,7 +131,26 @@ pub(super) fn order_of(field: &str) -> Option<DateOrder> {
     }
 }
 
+/// Midnight of `2024-180`, `2024.180`, `2024/180` or `2024:180`: year and day of the year.
+fn day_of_year(date: &str) -> Option<f64> {
+    let (year, day) = date.split_once(['-', '.', '/', ':'])?;
+    if year.len() != 4 || day.len() != 3 {
+        return None;
+    }
+    of_year(i64::from(whole(year)?), i64::from(whole(day)?))
+}
+
+/// Midnight of a day of a year, counted from 1.
+pub(super) fn of_year(year: i64, day: i64) -> Option<f64> {
+    let first = midnight(year, 1, 1)?;
+    let length = midnight(year, 12, 31)? / DAY_S - first / DAY_S + 1.0;
+    (day >= 1 && day as f64 <= length).then_some(first + (day - 1) as f64 * DAY_S)
+}
+
 fn day(date: &str, order: DateOrder) -> Option<f64> {
+    if let Some(midnight) = day_of_year(date) {
+        return Some(midnight);
+    }
     let mut parts = date.split(['/', '-', '.']);
     let (a, b, c) = (parts.next()?, parts.next()?, parts.next()?);
     if parts.next().is_some() || a.len() > 4 || c.len() > 4 {
@@ -141,13 +167,23 @@ fn day(date: &str, order: DateOrder) -> Option<f64> {
     midnight(y, m, d)
 }
 
-fn midnight(y: i64, m: i64, d: i64) -> Option<f64> {
+/// Seconds of a date; a year of two digits is one of this century.
+pub(super) fn midnight(y: i64, m: i64, d: i64) -> Option<f64> {
     let y = if (0..100).contains(&y) { y + 2000 } else { y };
     let sane = (1900..2200).contains(&y) && (1..=12).contains(&m) && (1..=31).contains(&d);
     let days = days_from_civil(y, m, d);
     // The 31st of a month of thirty days would come out as the first of the next.
     let there = sane && (d <= 28 || super::calendar::civil(days) == (y, m, d));
     there.then_some(days as f64 * DAY_S)
+}
+
+/// Seconds at which years begin and end that stamps without one are put into: a leap year before all others that are
+/// read.
+pub(super) const NO_YEAR_S: [f64; 2] = [-27_028.0 * DAY_S, -26_662.0 * DAY_S];
+
+fn midnight_without_year(m: i64, d: i64) -> Option<f64> {
+    // The lengths of months are those of the leap year 2000.
+    midnight(2000, m, d).map(|s| s - 10_957.0 * DAY_S + NO_YEAR_S[0])
 }
 
 /// `2024-06-28-14:35:00` and `2024/06/28-14:35:00`.
@@ -169,6 +205,9 @@ fn spelled(field: &str) -> Option<Stamp> {
         return None;
     }
     let (m, d): (i64, i64) = (month(words[0])?, words[1].parse().ok()?);
+    if words[2].contains(':') && words.len() == 3 {
+        return full(midnight_without_year(m, d)?, words[2]);
+    }
     if words[2].contains(':') {
         let y: i64 = words.last()?.parse().ok()?;
         return full(midnight(y, m, d)?, words[2]);
@@ -212,20 +251,14 @@ fn dotted_clock_s(text: &str) -> Option<f64> {
 }
 
 /// Seconds of a time of day, and the seconds its zone is ahead of UTC.
-fn clock_s(text: &str) -> Option<(f64, Option<f64>)> {
+pub(super) fn clock_s(text: &str) -> Option<(f64, Option<f64>)> {
     let mut lower = text.trim().to_ascii_lowercase();
     // 14h05, 14h05m30s
     if !lower.contains(':') && lower.split('h').next().is_some_and(|h| whole(h).is_some()) {
         lower = lower.replace(['h', 'm'], ":").trim_end_matches(['s', ':']).to_owned();
     }
     let (clock, zone) = split_zone(&lower)?;
-    let (clock, afternoon) = ["pm", "p.m."]
-        .iter()
-        .find_map(|end| clock.strip_suffix(end).map(|c| (c.trim_end(), Some(true))))
-        .or_else(|| {
-            ["am", "a.m."].iter().find_map(|end| clock.strip_suffix(end).map(|c| (c.trim_end(), Some(false))))
-        })
-        .unwrap_or((clock, None));
+    let (clock, afternoon) = split_afternoon(clock);
     let mut parts = clock.split(':');
     let (first, second) = (parts.next()?, parts.next()?);
     let third = parts.next();
@@ -252,6 +285,16 @@ fn clock_s(text: &str) -> Option<(f64, Option<f64>)> {
         None => h,
     };
     Some((f64::from(h) * 3600.0 + f64::from(m) * 60.0 + s, zone))
+}
+
+/// A time of day without `am`, `p.m.`, `p. m.` behind it, and whether it is one of the afternoon.
+fn split_afternoon(clock: &str) -> (&str, Option<bool>) {
+    let digits = clock.trim_end_matches(|c: char| matches!(c, 'a' | 'p' | 'm' | '.') || c.is_whitespace());
+    match clock[digits.len()..].chars().filter(|c| c.is_alphabetic()).collect::<String>().as_str() {
+        "am" => (digits, Some(false)),
+        "pm" => (digits, Some(true)),
+        _ => (clock, None),
+    }
 }
 
 fn whole(text: &str) -> Option<u32> {
@@ -317,7 +360,9 @@ impl StampReader {
         }
         let text = std::str::from_utf8(field).ok()?;
         if self.clock {
-            return dotted_clock_s(text).or_else(|| clock_s(text).map(|(s, _)| s)).map(Stamp::Clock);
+            let spelled = || iec(text, self.order).filter(|stamp| matches!(stamp, Stamp::Clock(_)));
+            let plain = dotted_clock_s(text).or_else(|| clock_s(text).map(|(s, _)| s));
+            return plain.map(Stamp::Clock).or_else(spelled);
         }
         let stamp = parse(text, self.order);
         if !matches!(stamp, Some(Stamp::Clock(_))) && text.contains(['/', '-', '.']) {

@@ -28,6 +28,7 @@ pub(super) fn read_text<R: Input + Seek>(
         format: FileFormat::Text(text),
         header_line: layout.header_line,
         first_data_line: layout.first_row + 1,
+        date_order: layout.order_shown.then_some(layout.date_order),
     };
     Ok((read, source))
 }
