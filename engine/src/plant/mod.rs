@@ -36,6 +36,7 @@ pub(crate) use lanes::{Number, Pack};
 pub use linear::{Disturbances, LinearOptions, Linearisation, OperatingPoint, linearise};
 pub use linear_error::LinearError;
 pub(crate) use motion::Motion;
+pub(crate) use motions::copy_few;
 pub use network::{Network, Pump, RIG_SCHEMA, Sensor, Tank, Valve};
 pub(crate) use pipe::Pipe;
 pub use pump_curve::CurveSide;

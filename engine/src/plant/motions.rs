@@ -72,10 +72,22 @@ fn advance<const N: usize, const S: usize>(
     if careful {
         motion.advance_carefully(network, left_s, fed, dry);
     }
-    for (level, now) in levels_cm.iter_mut().zip(&motion.now) {
-        *level = *now;
-    }
+    copy_few(levels_cm, &motion.now);
     careful
+}
+
+/// Copies numbers four at a time: for a handful, a call of the library's copy takes longer.
+#[inline(always)]
+pub(crate) fn copy_few(to: &mut [f64], from: &[f64]) {
+    let count = to.len().min(from.len());
+    let (to, to_rest) = to[..count].as_chunks_mut::<4>();
+    let (from, from_rest) = from[..count].as_chunks::<4>();
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
+    }
+    for (to, from) in to_rest.iter_mut().zip(from_rest) {
+        *to = *from;
+    }
 }
 
 impl Motions {

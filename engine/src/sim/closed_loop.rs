@@ -9,7 +9,7 @@ use crate::daq::{RigControls, SimulatedRig, Source};
 use crate::excitation::StopReason;
 use crate::plant::{
     ActiveFault, FaultKind, Measurement, Network, Reading, ReadingStatus, RigError, RigSpec, SteadyState,
-    SteadyTarget, steady_at_level, steady_at_levels,
+    SteadyTarget, copy_few, steady_at_level, steady_at_levels,
 };
 use crate::session::{CommandError, RigCommand};
 use crate::signal::ChannelSet;
@@ -236,10 +236,10 @@ impl ClosedLoop {
         let (levels, rest) = plant_cells.split_at_mut(tanks);
         let (of_pumps, rest) = rest.split_at_mut(2 * pumps);
         let (of_valves, spills) = rest.split_at_mut(2 * plant.angles_deg().len());
-        levels.copy_from_slice(plant.levels_cm());
+        copy_few(levels, plant.levels_cm());
         pair_up(of_pumps, plant.inputs(), plant.arriving_flows_cm3_s());
         pair_up(of_valves, plant.valve_flows_cm3_s(), plant.angles_deg());
-        spills.copy_from_slice(plant.spill_flows_cm3_s());
+        copy_few(spills, plant.spill_flows_cm3_s());
     }
 
     /// Makes the loops of the present configuration at the present outputs. `modes` are those of a configuration
