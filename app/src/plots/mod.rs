@@ -1,7 +1,7 @@
 //! What the plots of several panes share.
 
-use eframe::egui::Rangef;
-use egui_plot::{AxisHints, GridInput, GridMark};
+use eframe::egui::{self, Rangef};
+use egui_plot::{AxisHints, GridInput, GridMark, PlotPoint, PlotResponse};
 
 /// Least distance of labels on a horizontal and a vertical axis, in points.
 const X_SPACING: f32 = 56.0;
@@ -14,6 +14,45 @@ pub const WIDE_Y_WIDTH: f32 = 72.0;
 /// Labels appear at full strength or not at all: half-faded ones cannot be read on a projector.
 fn spacing(least: f32) -> Rangef {
     Rangef::new(least, least + 0.1)
+}
+
+/// How near to a mark in a plot a drag of it must begin, in points of the screen.
+const REACH: f64 = 9.0;
+
+/// What the pointer does with a mark that can be dragged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Grip {
+    /// Nothing.
+    Away,
+    /// It could take hold of it.
+    Near,
+    /// It holds it, here.
+    Held(PlotPoint),
+    /// It has just let it go.
+    Released,
+}
+
+/// What the pointer does with a mark that it `held` a frame ago; `distance` of a place from the mark in points of the
+/// screen. A drag begins within nine points of it.
+pub fn grip(
+    ui: &egui::Ui,
+    shown: &PlotResponse<()>,
+    held: bool,
+    distance: impl Fn(PlotPoint) -> f64,
+) -> Grip {
+    let released = if held { Grip::Released } else { Grip::Away };
+    let Some(pointer) = shown.response.interact_pointer_pos().or(shown.response.hover_pos()) else {
+        return released;
+    };
+    let at = shown.transform.value_from_position(pointer);
+    let near = distance(at) < REACH;
+    let (down, pressed) = ui.input(|i| (i.pointer.primary_down(), i.pointer.primary_pressed()));
+    match (down, held) {
+        (true, _) if held || near && pressed => Grip::Held(at),
+        (false, false) if near => Grip::Near,
+        (false, _) => released,
+        (true, _) => Grip::Away,
+    }
 }
 
 /// A horizontal axis.

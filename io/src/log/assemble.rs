@@ -24,6 +24,13 @@ pub(super) struct Source {
     pub date_order: Option<DateOrder>,
 }
 
+impl Source {
+    /// Of a format that has rows and no lines, and no dates that read two ways.
+    pub fn of_rows(format: FileFormat) -> Self {
+        Self { format, header_line: None, first_data_line: 1, date_order: None }
+    }
+}
+
 /// Makes the log.
 ///
 /// # Errors

@@ -32,14 +32,13 @@ pub(super) fn carry_on(
     read: &Read,
     repairs: &mut Vec<Repair>,
 ) {
-    let runs: Vec<Vec<u32>> =
-        keep.chunk_by(|&a, &b| raw[b as usize] >= raw[a as usize]).map(<[u32]>::to_vec).collect();
+    let runs: Vec<&[u32]> = keep.chunk_by(|&a, &b| raw[b as usize] >= raw[a as usize]).collect();
     let most = (CORRECTIONS * keep.len() as f64).max(1.0);
     if runs.len() < 2 || (runs.len() - 1) as f64 > most || calendar && stand_apart(raw, &runs) {
         return;
     }
     let mut found = Found::default();
-    let mut kept: Vec<u32> = runs[0].clone();
+    let mut kept: Vec<u32> = runs[0].to_vec();
     // Where in `kept` the run begins that goes on, and what its rows were moved by.
     let (mut begin, mut moved_s) = (0, 0.0);
     for run in &runs[1..] {
@@ -73,7 +72,7 @@ pub(super) fn carry_on(
 }
 
 /// Whether runs only need sorting: none holds times of another.
-fn stand_apart(raw: &[f64], runs: &[Vec<u32>]) -> bool {
+fn stand_apart(raw: &[f64], runs: &[&[u32]]) -> bool {
     let mut ends: Vec<[f64; 2]> =
         runs.iter().map(|run| [raw[run[0] as usize], raw[run[run.len() - 1] as usize]]).collect();
     ends.sort_by(|a, b| a[0].total_cmp(&b[0]));

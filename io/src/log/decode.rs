@@ -57,11 +57,11 @@ pub(super) fn detect(bytes: &[u8]) -> Result<Charset, ImportError> {
     if let Some(format) = foreign(bytes) {
         return Err(ImportError::Foreign { format });
     }
-    if let Some((mark, big)) = utf32::mark(bytes) {
-        if bytes[mark..].iter().all(|b| b.is_ascii_whitespace() || *b == 0) {
+    if let Some(big) = utf32::is_big(bytes) {
+        if bytes[utf32::MARK..].iter().all(|b| b.is_ascii_whitespace() || *b == 0) {
             return Err(ImportError::Empty);
         }
-        let charset = Charset::new(Encoding::Utf32, encoding_rs::UTF_8, mark);
+        let charset = Charset::new(Encoding::Utf32, encoding_rs::UTF_8, utf32::MARK);
         return Ok(Charset { big, ..charset });
     }
     if let Some((codec, mark)) = encoding_rs::Encoding::for_bom(bytes) {

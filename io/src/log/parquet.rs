@@ -73,8 +73,7 @@ pub(super) fn read_parquet(file: File, repairs: &mut Vec<Repair>) -> Result<(Rea
     }
     let columns = columns.into_iter().map(|(_, _, column)| column).collect();
     let lines = (1..=u32::try_from(count).unwrap_or(u32::MAX)).collect();
-    let source =
-        Source { format: FileFormat::Parquet, header_line: None, first_data_line: 1, date_order: None };
+    let source = Source::of_rows(FileFormat::Parquet);
     Ok((Read { columns, lines, stated_sample_time_s: None }, source))
 }
 

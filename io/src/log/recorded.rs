@@ -61,8 +61,7 @@ pub(super) fn read_run(path: &Path, repairs: &mut Vec<Repair>) -> Result<(Read, 
             .map(|(s, values)| ReadColumn::new(s.name, s.unit, Kind::Number, values)),
     );
     let lines = (1..=columns[0].values.len() as u32).collect();
-    let source =
-        Source { format: FileFormat::Recording, header_line: None, first_data_line: 1, date_order: None };
+    let source = Source::of_rows(FileFormat::Recording);
     Ok((Read { columns, lines, stated_sample_time_s: None }, source))
 }
 
@@ -83,8 +82,7 @@ fn read_rows(run: &RecordedRun) -> (Read, Source) {
         columns.push(column);
     }
     let lines = (1..=run.len() as u32).collect();
-    let source =
-        Source { format: FileFormat::Recording, header_line: None, first_data_line: 1, date_order: None };
+    let source = Source::of_rows(FileFormat::Recording);
     (Read { columns, lines, stated_sample_time_s: None }, source)
 }
 

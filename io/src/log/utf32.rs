@@ -12,11 +12,14 @@ impl std::fmt::Debug for Decoder {
     }
 }
 
-/// Bytes of the mark of UTF-32, and whether the highest byte of a letter comes first.
-pub(super) fn mark(bytes: &[u8]) -> Option<(usize, bool)> {
-    match bytes.get(..4)? {
-        [0xFF, 0xFE, 0, 0] => Some((4, false)),
-        [0, 0, 0xFE, 0xFF] => Some((4, true)),
+/// Bytes of the mark of UTF-32.
+pub(super) const MARK: usize = 4;
+
+/// Whether the highest byte of a letter comes first, by that mark; `None` where it is not there.
+pub(super) fn is_big(bytes: &[u8]) -> Option<bool> {
+    match bytes.get(..MARK)? {
+        [0xFF, 0xFE, 0, 0] => Some(false),
+        [0, 0, 0xFE, 0xFF] => Some(true),
         _ => None,
     }
 }

@@ -15,6 +15,7 @@ use vasos_engine::tune::optimum::LoopLimits;
 use crate::action::Action;
 use crate::panes::View;
 use crate::panes::tune::{row_in_view, title};
+use crate::plots::Grip;
 use crate::tuning::{PRESENT, Row};
 use crate::{plots, text, theme, tr};
 
@@ -189,36 +190,24 @@ fn drag_limit(
     state: &mut State,
     shown: &egui_plot::PlotResponse<()>,
 ) -> Vec<Action> {
-    /// How near to the circle a drag must begin, in points of the screen.
-    const REACH: f64 = 9.0;
     const RANGE: (f64, f64) = (1.02, 4.0);
     let settings = view.document.optimum;
-    let radius_at = |pointer: egui::Pos2| {
-        let at = shown.transform.value_from_position(pointer);
-        (at.x + 1.0).hypot(at.y)
-    };
-    let Some(pointer) = shown.response.interact_pointer_pos().or(shown.response.hover_pos()) else {
-        state.dragging = false;
-        return vec![];
-    };
+    let radius_at = |at: PlotPoint| (at.x + 1.0).hypot(at.y);
     let scale = shown.transform.dpos_dvalue_x().abs();
-    let near = (radius_at(pointer) - 1.0 / settings.limits.ms).abs() * scale < REACH;
-    let pressed = ui.input(|i| i.pointer.primary_down());
-    if !pressed {
-        let ended = std::mem::replace(&mut state.dragging, false);
-        if near {
+    let away = |at: PlotPoint| (radius_at(at) - 1.0 / settings.limits.ms).abs() * scale;
+    let grip = plots::grip(ui, shown, state.dragging, away);
+    state.dragging = matches!(grip, Grip::Held(_));
+    let at = match grip {
+        Grip::Away => return vec![],
+        Grip::Released => return vec![Action::Seal],
+        Grip::Near => {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Grab);
+            return vec![];
         }
-        return if ended { vec![Action::Seal] } else { vec![] };
-    }
-    if near && ui.input(|i| i.pointer.primary_pressed()) {
-        state.dragging = true;
-    }
-    if !state.dragging {
-        return vec![];
-    }
+        Grip::Held(at) => at,
+    };
     ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
-    let ms = (1.0 / radius_at(pointer)).clamp(RANGE.0, RANGE.1);
+    let ms = (1.0 / radius_at(at)).clamp(RANGE.0, RANGE.1);
     let limits = LoopLimits { ms, ..settings.limits };
     vec![Action::Document(DocumentCommand::Optimum(OptimumSettings { limits, ..settings }))]
 }

@@ -6,11 +6,10 @@ use vasos_engine::document::DocumentCommand;
 use vasos_engine::tune::find_rule;
 
 use crate::action::Action;
+use crate::plots::{self, Grip};
 use crate::tuning::Row;
 use crate::{text, theme, tr};
 
-/// How near to the handle a drag must begin, in points of the screen.
-const REACH: f64 = 9.0;
 /// Shortest τc that a drag reaches, as a share of the one at its beginning and of the dead time.
 const SHORTEST: (f64, f64) = (0.02, 0.05);
 
@@ -67,26 +66,24 @@ impl Handle {
         axis_s: f64,
         shown: &egui_plot::PlotResponse<()>,
     ) -> Vec<Action> {
-        let Some(pointer) = shown.response.interact_pointer_pos().or(shown.response.hover_pos()) else {
-            return if drag.take().is_some() { vec![Action::Seal] } else { vec![] };
-        };
-        let at_s = shown.transform.value_from_position(pointer).x;
-        let near = (at_s - self.at_s()).abs() * shown.transform.dpos_dvalue_x().abs() < REACH;
-        if !ui.input(|i| i.pointer.primary_down()) {
-            let ended = drag.take().is_some();
-            if near {
+        let scale = shown.transform.dpos_dvalue_x().abs();
+        let at = match plots::grip(ui, shown, drag.is_some(), |at| (at.x - self.at_s()).abs() * scale) {
+            Grip::Away => return vec![],
+            Grip::Released => {
+                *drag = None;
+                return vec![Action::Seal];
+            }
+            Grip::Near => {
                 ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
                 shown.response.clone().on_hover_text_at_pointer(tr!("step.speed_hint"));
+                return vec![];
             }
-            return if ended { vec![Action::Seal] } else { vec![] };
-        }
-        if near && ui.input(|i| i.pointer.primary_pressed()) {
-            let least_s = (SHORTEST.0 * self.tau_c_s).max(SHORTEST.1 * self.dead_time_s);
-            *drag = Some(Drag { least_s, axis_s });
-        }
-        let Some(Drag { least_s, axis_s }) = *drag else { return vec![] };
+            Grip::Held(at) => at,
+        };
         ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
-        let tau_c_s = (at_s.min(axis_s) - self.dead_time_s).max(least_s);
+        let least_s = (SHORTEST.0 * self.tau_c_s).max(SHORTEST.1 * self.dead_time_s);
+        let Drag { least_s, axis_s } = *drag.get_or_insert(Drag { least_s, axis_s });
+        let tau_c_s = (at.x.min(axis_s) - self.dead_time_s).max(least_s);
         vec![Action::Document(DocumentCommand::TauC(self.rule.to_owned(), Some(tau_c_s)))]
     }
 }
