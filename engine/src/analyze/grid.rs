@@ -7,8 +7,8 @@ use super::stability::GainCrossing;
 ///
 /// Peaks are refined from these points, so they only have to separate neighbouring peaks; the tests compare with a
 /// grid a hundred times as dense.
-const NEAR: f64 = 1.13;
-const BETWEEN: f64 = 1.3;
+const NEAR: f64 = 1.27;
+const BETWEEN: f64 = 1.45;
 const BEYOND: f64 = 1.6;
 /// A frequency within this ratio of a feature is near it.
 const REACH: f64 = 4.0;
@@ -18,6 +18,8 @@ const REACH: f64 = 4.0;
 /// ripples: a maximum beyond these margins lies less than 1e-7 above the limit.
 const MARGIN: f64 = 300.0;
 const MARGIN_OF_RIPPLES: f64 = 1e4;
+/// How far from a lightly damped root, relative to it, its own points go.
+const WIDTH: f64 = 0.27;
 /// Damping ratio under which a pole or zero gets points across its own width.
 const LIGHT_DAMPING: f64 = 0.25;
 /// Share of a ripple's period 2π/θ between points, a tenth, as a phase in radians.
@@ -108,7 +110,7 @@ fn push_resonances(open: &OpenLoop, omegas: &mut Vec<f64>) -> bool {
             continue;
         }
         let mut offset = 0.5 * (root.re.abs() / modulus).max(1e-7);
-        while offset < NEAR - 1.0 {
+        while offset < WIDTH {
             omegas.extend([root.im * (1.0 - offset), root.im * (1.0 + offset)]);
             offset *= 1.5;
         }

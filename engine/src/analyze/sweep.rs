@@ -242,7 +242,9 @@ impl<'a> Sweep<'a> {
 #[inline]
 fn reciprocals(omega: f64, p: &LoopPoint) -> Reciprocals {
     let d = p.one_plus_l_sqr;
-    [d, d / p.l.norm_sqr(), d * omega * omega / p.g_sqr, d / p.c_sqr]
+    // One division for |L|⁻², |G|⁻² and |C|⁻².
+    let scaled = d / (p.g_sqr * p.c_sqr);
+    [d, scaled, scaled * p.c_sqr * omega * omega, scaled * p.g_sqr]
 }
 
 /// |S|, |T|, |G S/s| and |C S| for ω → 0 of a stable loop, from the first terms of G and C.
