@@ -9,9 +9,9 @@ use super::stability::GainCrossing;
 /// grid a hundred times as dense.
 const NEAR: f64 = 1.27;
 const BETWEEN: f64 = 1.45;
-const BEYOND: f64 = 1.6;
+const BEYOND: f64 = 2.0;
 /// A frequency within this ratio of a feature is near it.
-const REACH: f64 = 4.0;
+const REACH: f64 = 3.0;
 /// How far below the first and above the last feature the limits at 0 and ∞ are taken to rule.
 ///
 /// Towards a limit a function runs as 1 + a x − b x² with x = (feature/ω)², and x = feature/ω for the envelope of
@@ -22,8 +22,8 @@ const MARGIN_OF_RIPPLES: f64 = 1e4;
 const WIDTH: f64 = 0.27;
 /// Damping ratio under which a pole or zero gets points across its own width.
 const LIGHT_DAMPING: f64 = 0.25;
-/// Share of a ripple's period 2π/θ between points, a tenth, as a phase in radians.
-pub(super) const RIPPLE_STEP_RAD: f64 = 0.6;
+/// Share of a ripple's period 2π/θ between points, an eighth, as a phase in radians.
+pub(super) const RIPPLE_STEP_RAD: f64 = 0.8;
 /// Most points of a grid, against models whose features lie absurdly far apart.
 const MOST_POINTS: usize = 20_000;
 

@@ -223,7 +223,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Visits every tenth of a ripple between two frequencies, and the grid's own points among them.
+    /// Visits every eighth of a ripple between two frequencies, and the grid's own points among them.
     fn scan(&mut self, from: f64, to: f64, omegas: &[f64]) {
         (self.before, self.last) = (None, None);
         let step = RIPPLE_STEP_RAD / self.open.dead_time_s;
