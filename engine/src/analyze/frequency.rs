@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::OpenLoop;
-use super::grid::{RIPPLE_STEP_RAD, features};
+use super::grid::features;
 use super::stability::gain_crossings;
 
 /// A function of the loop that can be drawn.
@@ -64,6 +64,8 @@ impl Default for CurveOptions {
 const DECADES_AROUND: f64 = 1.0;
 /// Points per decade before the curve is refined.
 const COARSE_PER_DECADE: f64 = 12.0;
+/// Coarsest step over the dead time's ripples, a tenth of their period, as a phase in radians.
+const RIPPLE_STEP_RAD: f64 = 0.6;
 /// Halvings of one coarse interval at most.
 const DEEPEST: u32 = 12;
 
