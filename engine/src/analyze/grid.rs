@@ -9,7 +9,7 @@ use super::stability::GainCrossing;
 /// grid a hundred times as dense.
 const NEAR: f64 = 1.27;
 const BETWEEN: f64 = 1.45;
-const BEYOND: f64 = 2.0;
+const BEYOND: f64 = 1.6;
 /// A frequency within this ratio of a feature is near it.
 const REACH: f64 = 3.0;
 /// How far below the first and above the last feature the limits at 0 and ∞ are taken to rule.
