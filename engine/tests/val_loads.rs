@@ -87,6 +87,8 @@ struct Case {
     /// Row from which the load is there, and its size in units of where it enters.
     at: usize,
     size: f64,
+    /// Further loads at the same place: row and size.
+    more: &'static [(usize, f64)],
     /// Correlation of the noise's neighbours.
     rho: f64,
 }
@@ -110,7 +112,7 @@ impl Case {
             (true, Process::Integrator) => 0.05,
             (true, _) => 0.1,
             // The noise-free output without the load: its step is no movement that tells the process.
-            _ => share_of(&Self { size: 0.0, ..*self }.run(&time_s, &vec![0.0; ROWS]).0, 0.01),
+            _ => share_of(&Self { size: 0.0, more: &[], ..*self }.run(&time_s, &vec![0.0; ROWS]).0, 0.01),
         };
         let (pv, mv) = run(sd);
         Record { time_s, pv, mv }
@@ -129,7 +131,8 @@ impl Case {
         let (mut pv, mut mv) = (vec![], vec![]);
         let (mut u, mut last) = (0.0, 0.0);
         for k in 0..ROWS {
-            let load = if k >= self.at { self.size } else { 0.0 };
+            let steps = std::iter::once((self.at, self.size)).chain(self.more.iter().copied());
+            let load: f64 = steps.filter(|(at, _)| k >= *at).map(|(_, size)| size).sum();
             let (output, input) = if self.place == Place::Output { (load, 0.0) } else { (0.0, load) };
             let measured = states.iter().sum::<f64>() + output + noise[k];
             if self.closed {
@@ -220,7 +223,7 @@ fn loaded() -> Vec<Case> {
                 (Place::Input, 150, 1.0),
                 (Place::Input, 310, 0.4),
             ] {
-                out.push(Case { process, closed, place, at, size, rho: 0.0 });
+                out.push(Case { process, closed, place, at, size, more: &[], rho: 0.0 });
             }
         }
     }
@@ -228,7 +231,15 @@ fn loaded() -> Vec<Case> {
 }
 
 fn unloaded(rho: f64) -> Vec<Case> {
-    let one = |(process, closed)| Case { process, closed, place: Place::Output, at: 300, size: 0.0, rho };
+    let one = |(process, closed)| Case {
+        process,
+        closed,
+        place: Place::Output,
+        at: 300,
+        size: 0.0,
+        more: &[],
+        rho,
+    };
     PROCESSES.into_iter().flat_map(|p| [(p, false), (p, true)]).map(one).collect()
 }
 
@@ -303,12 +314,54 @@ fn val_no_load_in_coloured_noise_over_2000() {
     }
 }
 
+/// The raw residuals had to be white: with noise that wanders no load was ever told, and the interval of K beside two of them
+/// was ±70 % or wider.
+#[test]
+fn loads_are_told_in_noise_that_wanders() {
+    let more: [&'static [(usize, f64)]; 3] = [&[], &[(380, -1.5)], &[(300, -1.5), (450, 2.0)]];
+    let (mut placed, mut held, mut all) = (0, 0, 0);
+    for more in more {
+        // In open loop the first of three hides the others, and nothing may be told.
+        for closed in if more.len() == 2 { vec![true] } else { vec![false, true] } {
+            let case = Case {
+                process: Process::First,
+                closed,
+                place: Place::Output,
+                at: 140,
+                size: 1.0,
+                more,
+                rho: 0.8,
+            };
+            for seed in 0..6 {
+                let fit = case.fit(seed);
+                let near = |at: usize| fit.loads.iter().any(|l| (l.at_s - at as f64).abs() < 15.0);
+                let mut places = std::iter::once(case.at).chain(more.iter().map(|(at, _)| *at));
+                let right = fit.loads.len() == 1 + more.len() && places.all(near);
+                let [low, high] = fit.parameters[0].interval_95;
+                placed += u64::from(right);
+                held += u64::from((low..=high).contains(&2.0) && high - low < 0.4);
+                all += 1;
+            }
+        }
+    }
+    println!("{placed} placed, {held} held of {all}");
+    assert!(placed * 10 >= all * 9 && held * 10 >= all * 8, "{placed} placed, {held} held of {all}");
+}
+
+#[test]
+fn no_load_is_told_in_noise_that_wanders() {
+    for case in [0.8, 0.9].into_iter().flat_map(unloaded) {
+        let found = count(&case, 12);
+        assert!(found.told == 0, "{}", line(&case, &found, 12));
+    }
+}
+
 /// With all structures to choose from the load is told at its place, and the structure is the one chosen without it.
 #[test]
 fn a_choice_tells_the_load_and_keeps_the_structure() {
     for process in [Process::First, Process::TwoLags] {
         for closed in [false, true] {
-            let case = Case { process, closed, place: Place::Input, at: 320, size: 0.6, rho: 0.0 };
+            let case = Case { process, closed, place: Place::Input, at: 320, size: 0.6, more: &[], rho: 0.0 };
             for seed in 0..3 {
                 let choice = case.choice(seed);
                 let fit = choice.chosen();

@@ -3,6 +3,7 @@
 //! With residuals r orthogonal to the fit's sensitivities J, a further column c lowers ‖r‖² by (cᵀr)²/(cᵀc − ‖Qᵀc‖²),
 //! Q an orthonormal basis of J: what no parameter of the fit can make up for. Rows are taken together in bins.
 
+use crate::identify::fit_structure::free_run;
 use crate::identify::output_error::{Found, Order, Point, Shape, blocks, derivatives};
 use crate::identify::problem::Stretch;
 
@@ -62,6 +63,39 @@ fn kinds(here: &Stretch, shape: &Shape, found: &Found) -> Vec<(Order, Point)> {
     out
 }
 
+/// Number of sensitivities of a fit.
+pub(super) fn size(here: &Stretch, shape: &Shape) -> usize {
+    shape.shared.len() + shape.unknowns + shape.local.len() * here.segments.len()
+}
+
+/// Hands on what each unknown of a fit does to each row: its place, the row and the share, which add up.
+pub(super) fn sensitivities(
+    here: &Stretch,
+    shape: &Shape,
+    found: &Found,
+    mut put: impl FnMut(usize, usize, f64),
+) {
+    let linear = &found.projected.linear;
+    blocks(here, shape, &found.points, linear, |segment, first, block| {
+        let slopes = if shape.differentiable {
+            derivatives(shape, &linear.shared, &linear.local[segment])
+        } else {
+            vec![]
+        };
+        let single = |column: usize| vec![(1.0, column)];
+        let shared = shape.shared.iter().map(|t| single(t.column)).chain(slopes).enumerate();
+        let start = shape.shared.len() + shape.unknowns + shape.local.len() * segment;
+        let local = shape.local.iter().enumerate().map(|(i, t)| (start + i, single(t.column)));
+        for (at, combination) in shared.chain(local) {
+            for (weight, column) in combination.into_iter().filter(|(_, column)| block.alive[*column]) {
+                for (i, value) in block.values[column][..block.rows].iter().enumerate() {
+                    put(at, first + i, weight * value);
+                }
+            }
+        }
+    });
+}
+
 struct Bins {
     /// Root of the rows in each, its mean time, and the stamp of its first row, counted from the problem's first.
     weight: Vec<f64>,
@@ -79,10 +113,7 @@ impl Bins {
         let rows_of_bin = here.len().div_ceil(BINS);
         let bin = |row: usize| row / rows_of_bin;
         let count = bin(here.len() - 1) + 1;
-        let linear = &found.projected.linear;
-        let locals = shape.local.len();
-        let size = shape.shared.len() + shape.unknowns + locals * here.segments.len();
-        let mut columns = vec![vec![0.0; count]; size];
+        let mut columns = vec![vec![0.0; count]; size(here, shape)];
         let mut out = Self {
             weight: vec![0.0; count],
             middle_s: vec![0.0; count],
@@ -92,30 +123,14 @@ impl Bins {
             rss: found.rss(),
             mean_square: found.rss() / here.kept().max(1) as f64,
         };
-        blocks(here, shape, &found.points, linear, |segment, first, block| {
-            let slopes = if shape.differentiable {
-                derivatives(shape, &linear.shared, &linear.local[segment])
-            } else {
-                vec![]
-            };
-            let single = |column: usize| vec![(1.0, column)];
-            let shared = shape.shared.iter().map(|t| single(t.column)).chain(slopes).enumerate();
-            let start = shape.shared.len() + shape.unknowns + locals * segment;
-            let local = shape.local.iter().enumerate().map(|(i, t)| (start + i, single(t.column)));
-            for (at, combination) in shared.chain(local) {
-                for (weight, column) in combination.into_iter().filter(|(_, column)| block.alive[*column]) {
-                    for (i, value) in block.values[column][..block.rows].iter().enumerate() {
-                        columns[at][bin(first + i)] += weight * value;
-                    }
-                }
-            }
-            for i in (0..block.rows).filter(|i| here.is_kept(first + i)) {
-                let at = bin(first + i);
-                out.residual[at] += block.values[shape.residual][i];
-                out.weight[at] += 1.0;
-                out.middle_s[at] += here.t[first + i] - here.origin_s;
-            }
-        });
+        sensitivities(here, shape, found, |at, row, value| columns[at][bin(row)] += value);
+        let residuals = free_run(here, shape, found).1;
+        for row in here.kept_rows() {
+            let at = bin(row);
+            out.residual[at] += residuals[row];
+            out.weight[at] += 1.0;
+            out.middle_s[at] += here.t[row] - here.origin_s;
+        }
         for at in 0..count {
             let rows = out.weight[at];
             out.middle_s[at] = if rows > 0.0 { out.middle_s[at] / rows } else { out.first_s[at] };
