@@ -88,7 +88,7 @@ pub(super) fn with_loads_where_due(
 /// own. In coloured noise a process that is not linear passes for one with a load at its only move: there neither is told.
 fn is_complete(fit: &ModelFit, without: &ModelFit, stretch: &Stretch) -> bool {
     /// Independent rows below which noise and loads not yet found look alike: an autoregression takes either for noise.
-    const INDEPENDENT: f64 = 30.0;
+    const INDEPENDENT: f64 = 45.0;
     /// Probability below which white innovations would be too unlikely.
     const WHITE: f64 = 1e-3;
     let tests = noise::innovation_tests(&fit.residuals, &stretch.u[stretch.history..]);
