@@ -1,5 +1,7 @@
 //! Gauss–Newton over the non-linear unknowns with Levenberg–Marquardt damping.
 
+use std::cell::Cell;
+
 use super::fill::grams;
 use super::project::{Projected, Symmetric, project};
 use super::shape::{Linear, Order, Point, Shape};
@@ -80,6 +82,19 @@ pub(in crate::identify) fn evaluate(
     projected.rss.is_finite().then_some(Found { points, projected })
 }
 
+/// A refinement: how far it goes.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::identify) struct Refinement<'a> {
+    pub stretch: &'a Stretch<'a>,
+    pub shape: &'a Shape,
+    /// Most passes.
+    pub passes: usize,
+    /// The unknown held where it is.
+    pub fixed: Option<usize>,
+    /// A channel and two dead times: once between them it is given up, for the cost is smooth there and its minimum known.
+    pub known: Option<(usize, [f64; 2])>,
+}
+
 /// Refines a start with at most `passes` passes, which it counts.
 pub(in crate::identify) fn refine(
     stretch: &Stretch,
@@ -88,32 +103,66 @@ pub(in crate::identify) fn refine(
     passes: usize,
     count: &mut usize,
 ) -> Option<Found> {
-    refine_holding(stretch, shape, start, passes, None, count)
+    Refinement { stretch, shape, passes, fixed: None, known: None }.from(start, count)
 }
 
-/// The same with one unknown held where it is.
-pub(in crate::identify) fn refine_holding(
-    stretch: &Stretch,
-    shape: &Shape,
-    start: &[Point],
-    passes: usize,
-    fixed: Option<usize>,
-    count: &mut usize,
-) -> Option<Found> {
-    let bounds = Bounds::of(stretch);
-    let clip = |points: &[Point]| bounds.clip_all(shape, points);
-    *count += 1;
-    let start = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
-    let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
-    let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
-    let step = |at: &Found, damping: f64| {
-        let reduced = Reduced::of(&at.projected, &held(shape, &at.points, fixed));
-        let target = clip(&moved(shape, &at.points, &reduced.step(damping)));
-        let taken = difference(shape, &at.points, &target);
-        (!reduced.is_small(&taken, at.rss() / spare, tolerance)).then_some(target)
-    };
-    let pass = |target: Vec<Point>, best: &Found| evaluate(stretch, shape, target, &best.projected.linear);
-    Some(descend(start, passes, count, Found::rss, step, pass))
+impl Refinement<'_> {
+    /// The point reached, and the passes taken added to `count`.
+    pub fn from(&self, start: &[Point], count: &mut usize) -> Option<Found> {
+        let Self { stretch, shape, .. } = *self;
+        let bounds = Bounds::of(stretch);
+        let clip = |points: &[Point]| bounds.clip_all(shape, points);
+        *count += 1;
+        let start = evaluate(stretch, shape, clip(start), &Linear::zero(shape, stretch))?;
+        let spare = stretch.kept().saturating_sub(shape.parameters(stretch)).max(1) as f64;
+        let tolerance = STEP_IN_STANDARD_ERRORS[usize::from(stretch.len() > MANY_ROWS)];
+        let valley = Valley::new();
+        let step = |at: &Found, damping: f64| {
+            let variance = at.rss() / spare;
+            if self.is_known(at) || valley.is_flat(at.rss(), tolerance * variance) {
+                return None;
+            }
+            let reduced = Reduced::of(&at.projected, &held(shape, &at.points, self.fixed));
+            let target = clip(&moved(shape, &at.points, &reduced.step(damping)));
+            let taken = difference(shape, &at.points, &target);
+            (!reduced.is_small(&taken, variance, tolerance)).then_some(target)
+        };
+        let pass =
+            |target: Vec<Point>, best: &Found| evaluate(stretch, shape, target, &best.projected.linear);
+        Some(descend(start, self.passes, count, Found::rss, step, pass))
+    }
+
+    fn is_known(&self, at: &Found) -> bool {
+        self.known.is_some_and(|(channel, [from, to])| {
+            let dead_time_s = at.points[channel].dead_time_s;
+            from < dead_time_s && dead_time_s < to
+        })
+    }
+}
+
+/// Tells that a descent has come to the floor of a valley, along which long steps gain nothing: a zero on a time constant
+/// leaves both free, and what is told has long been found.
+struct Valley {
+    last: Cell<f64>,
+    slow: Cell<usize>,
+}
+
+impl Valley {
+    /// Gains in turn that are worth nothing.
+    const SLOW: usize = 3;
+
+    fn new() -> Self {
+        Self { last: Cell::new(f64::INFINITY), slow: Cell::new(0) }
+    }
+
+    /// Whether the last gains were each below `worth`.
+    fn is_flat(&self, rss: f64, worth: f64) -> bool {
+        let gain = self.last.replace(rss) - rss;
+        if gain > 0.0 {
+            self.slow.set(if gain < worth { self.slow.get() + 1 } else { 0 });
+        }
+        self.slow.get() >= Self::SLOW
+    }
 }
 
 /// For each unknown: which way it may not go.

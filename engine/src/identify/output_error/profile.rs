@@ -5,7 +5,7 @@
 //! most where the response starts steeply. The dead time of a first order that noise all but hides has an interval so
 //! wide that the response bends within it: the curvature at the optimum cleared 0 in one record of nine there.
 
-use super::descend::{Found, refine_holding};
+use super::descend::{Found, Refinement};
 use super::shape::{Order, Shape};
 use crate::identify::fopdt::Interval;
 use crate::identify::problem::Stretch;
@@ -59,11 +59,12 @@ pub(in crate::identify) fn dead_time_interval(
     }
     let unknown = shape.first_unknown(channel) + shape.channels[channel].unknowns() - 1;
     let found_s = best.points[channel].dead_time_s;
+    let refinement = Refinement { stretch, shape, passes: PASSES, fixed: Some(unknown), known: None };
     // Signed root of the likelihood ratio, close to (L − L̂)/se.
     let ratio = |dead_time_s: f64| {
         let mut points = best.points.clone();
         points[channel].dead_time_s = dead_time_s;
-        let at = refine_holding(stretch, shape, &points, PASSES, Some(unknown), passes)?;
+        let at = refinement.from(&points, passes)?;
         Some(((at.rss() - best.rss()).max(0.0) / variance).sqrt())
     };
     ends(found_s, student * standard_error_s, student, SECANTS, ratio)

@@ -1,6 +1,6 @@
 //! Global start of a shape and its refinement from thinned-out copies to all rows.
 
-use super::descend::{Bounds, Found, evaluate, refine};
+use super::descend::{Bounds, Found, Refinement, evaluate, refine};
 use super::shape::{Linear, Order, Point, Shape};
 use crate::identify::problem::Stretch;
 use crate::identify::start::starts;
@@ -81,10 +81,12 @@ fn look_around(stretch: &Stretch, shape: &Shape, best: Found, work: &mut Work) -
             continue;
         }
         let cell = (found.dead_time_s / h).floor();
+        let known = Some((channel, [cell * h, (cell + 1.0) * h]));
+        let away = Refinement { stretch, shape, passes: CELL_PASSES, fixed: None, known };
         for dead_time_s in [(cell - 0.5) * h, cell * h, (cell + 1.5) * h] {
             let mut at = best.points.clone();
             at[channel].dead_time_s = dead_time_s.max(0.0);
-            if let Some(other) = refine(stretch, shape, &at, CELL_PASSES, &mut work.passes)
+            if let Some(other) = away.from(&at, &mut work.passes)
                 && other.rss() < best.rss()
             {
                 best = other;
